@@ -1,0 +1,107 @@
+"""Files that are either whole or absent: written aside, synced, renamed."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load_file, save_file
+
+from bootifol.errors import BootifolError
+from bootifol.types import Arrays
+
+
+@contextmanager
+def written_aside(target: Path) -> Iterator[Path]:
+    """Yields a path to write to; on success syncs it and renames it to `target`.
+
+    On any error the half-written file or directory is removed and an existing `target` is untouched.
+
+    Raises:
+        BootifolError: the disk is full or not writable.
+    """
+    aside = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.tmp")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        yield aside
+        for path in [aside, *aside.rglob("*")] if aside.is_dir() else [aside]:
+            _sync(path)
+        if aside.is_dir() and target.is_dir():
+            old = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.old")
+            os.replace(target, old)
+            os.replace(aside, target)
+            shutil.rmtree(old)
+        else:
+            os.replace(aside, target)
+        _sync(target.parent)
+    except (OSError, SafetensorError) as error:
+        raise BootifolError(
+            f"cannot write {target}: {error}; free some space or choose another directory "
+            "(whatever was there before is untouched)"
+        ) from error
+    finally:
+        if aside.is_dir():
+            shutil.rmtree(aside, ignore_errors=True)
+        else:
+            aside.unlink(missing_ok=True)
+
+
+def write_json(target: Path, value: Any) -> None:
+    """Writes `value` as indented JSON; NaN is refused (it is not JSON)."""
+    text = json.dumps(value, indent=2, allow_nan=False) + "\n"
+    with written_aside(target) as aside:
+        aside.write_text(text)
+
+
+def read_json(path: Path, what: str) -> Any:
+    """Reads JSON.
+
+    Args:
+        path: the file.
+        what: what the file is to the user, for the error's sentence ("the demo set's manifest").
+
+    Raises:
+        BootifolError: the file is missing or is not JSON.
+    """
+    try:
+        return json.loads(path.read_text())
+    except FileNotFoundError:
+        raise BootifolError(f"{what} is missing: there is no {path}") from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise BootifolError(f"{what} cannot be read: {path}: {error}") from error
+
+
+def write_arrays(target: Path, arrays: Arrays) -> None:
+    """Writes named arrays as one safetensors file."""
+    with written_aside(target) as aside:
+        save_file({name: np.ascontiguousarray(array) for name, array in arrays.items()}, aside)
+
+
+def read_arrays(path: Path, what: str) -> Arrays:
+    """Reads a safetensors file; nothing is unpickled.
+
+    Raises:
+        BootifolError: the file is missing, truncated or damaged.
+    """
+    try:
+        return dict(load_file(path))
+    except FileNotFoundError:
+        raise BootifolError(f"{what} is missing: there is no {path}") from None
+    except (OSError, SafetensorError, ValueError) as error:
+        raise BootifolError(f"{what} is damaged or incomplete: {path}: {error}") from error
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,47 @@
+"""What every reward method implements. `training/` knows this protocol and no method by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Protocol
+
+from bootifol.types import Arrays, Metrics, Rewards, Video, VideoSource
+
+
+class RewardModel(Protocol):
+    """A reward learned from videos: `align` before the agent acts, `update` while it does, `label` its episodes."""
+
+    reads_environment_reward: bool
+    """True only for the upper bound `environment`; otherwise the environment's reward never reaches a learner."""
+
+    reference_count: int
+    """How many expert videos `label` wants to compare an episode with (1 in the paper, 0 for none)."""
+
+    version: int
+    """Counts the updates of the encoders; encodings computed under another version are stale."""
+
+    def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
+        """Alignment Phase (Algorithm 1, first loop): endless; yields the metrics of one gradient step each time."""
+        ...
+
+    def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:
+        """Interactive Phase: one gradient step on expert videos and the agent's own."""
+        ...
+
+    def label(self, video: Video, references: Sequence[Video]) -> Rewards:
+        """Rewards a whole episode in one causal pass.
+
+        Args:
+            video: frames `[T + 1, H, W, 3]`.
+            references: `reference_count` expert videos of at least `T + 1` frames.
+
+        Returns:
+            float32 `[T]`; entry `t` depends on frames `0 … t + 1` only.
+        """
+        ...
+
+    def state(self) -> Arrays:
+        """Parameters, optimizer, normalization statistics and random state."""
+        ...
+
+    def load_state(self, arrays: Arrays) -> None: ...

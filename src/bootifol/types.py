@@ -1,0 +1,112 @@
+"""What flows through the library, with its shapes.
+
+Letters used in every shape comment:
+
+- `T`: agent steps of an episode, so an episode has `T + 1` frames.
+- `H, W`: height and width of a frame in pixels.
+- `A`: number of action dimensions.
+- `B`: batch size.  `C`: channels.  `Z`: size of an embedding (128 in the paper).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+Frame = NDArray[np.uint8]
+"""One RGB picture, uint8 `[H, W, 3]`."""
+
+Frames = NDArray[np.uint8]
+"""The pictures of one episode, uint8 `[T + 1, H, W, 3]`; frame 0 precedes the first action."""
+
+FrameBatch = NDArray[np.uint8]
+"""Videos of one length, uint8 `[B, T + 1, H, W, 3]`."""
+
+Observation = NDArray[np.uint8]
+"""What the agent sees: the newest frames stacked along channels, oldest first, uint8 `[H, W, 3 * stack]`."""
+
+Action = NDArray[np.float32]
+"""Float32 `[A]` in [-1, 1]; environments rescale it to their own range."""
+
+Rewards = NDArray[np.float32]
+"""Float32 `[T]`; entry `t` rewards action `t`, after which frame `t + 1` was seen."""
+
+Metrics = Mapping[str, float]
+"""Named numbers to log, such as `{"loss/sequence": 0.41}`."""
+
+Arrays = dict[str, NDArray[np.generic]]
+"""The state of a component as named arrays, ready for a safetensors file."""
+
+
+@dataclass(frozen=True)
+class Video:
+    """A recording: pictures and a name, nothing else."""
+
+    name: str
+    """Unique among the videos of one run; caches of encodings use it as their key."""
+
+    frames: Frames
+    """uint8 `[T + 1, H, W, 3]` at the size the reward model reads."""
+
+    environment_rewards: Rewards | None = None
+    """The true rewards `[T]`. None, except on the agent's own episodes under the method named
+    `environment` (the upper bound), which is the only one that may read them."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One episode of the agent, as learners may see it: no reward of the environment."""
+
+    frames: Frames
+    """uint8 `[T + 1, S, S, 3]` at the size the agent reads."""
+
+    actions: NDArray[np.float32]
+    """`[T, A]`; action `t` was taken after frame `t`."""
+
+    video: Video
+    """The same episode at the size the reward model reads."""
+
+    terminated: bool
+    """True when the environment ended by itself (no bootstrapping from the last frame);
+    False when the time limit cut it."""
+
+    @property
+    def agent_steps(self) -> int:
+        return len(self.actions)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """`B` n-step transitions sampled from replay."""
+
+    observation: torch.Tensor
+    """uint8 `[B, 3 * stack, S, S]`, channels-last in memory, randomly shifted."""
+
+    action: torch.Tensor
+    """float32 `[B, A]`."""
+
+    reward: torch.Tensor
+    """float32 `[B]`: the sum of `discount ** k * r_{t+k}` for k below the steps taken (n, or fewer at the end)."""
+
+    discount: torch.Tensor
+    """float32 `[B]`: the weight of the value of `next_observation`; 0 after a termination."""
+
+    next_observation: torch.Tensor
+    """uint8 `[B, 3 * stack, S, S]`, as `observation`."""
+
+
+class VideoSource(Protocol):
+    """Videos to draw from: a demo set on disk, or the agent's own episodes."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index: int) -> Video: ...
+
+    def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
+        """`count` videos drawn uniformly, without repetition where there are enough."""
+        ...
