@@ -1,0 +1,142 @@
+"""How well an agent does: returns of episodes with fixed seeds, their scale, and how sure one can be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import stats
+
+from bootifol.envs.rollout import Act, play_episode
+from bootifol.errors import BootifolError
+from bootifol.evaluation.tables import EvaluationRow
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """One evaluation episode."""
+
+    seed: int
+    """The seed its start was drawn with."""
+
+    environment_return: float
+    """Sum of the environment's own rewards, which reach evaluation only."""
+
+    success: bool | None
+    """Whether the task was solved, where the environment says so."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Several numbers in a few."""
+
+    count: int
+    mean: float
+    median: float
+    interquartile_mean: float
+    """Mean of the middle half: less noisy than the median, less swayed by one lucky episode than the mean."""
+
+    interval: tuple[float, float] | None
+    """Bootstrap interval of the mean; None for a single number, which says nothing about spread."""
+
+
+def evaluate(
+    environment: gymnasium.Env[Any, Any], act: Act, seeds: Sequence[int], name: str = "evaluation"
+) -> list[EpisodeResult]:
+    """Plays one episode a seed, without exploration noise if `act` adds none.
+
+    Args:
+        environment: from `make_environment`; its time limit is the length of the episodes.
+        act: the policy.
+        seeds: one per episode; the same seeds give the same starts in any process.
+        name: prefix of the episodes' names.
+    """
+    results: list[EpisodeResult] = []
+    for seed in seeds:
+        played = play_episode(environment, act, seed, f"{name}-{seed}")
+        results.append(EpisodeResult(seed, played.environment_return, played.success))
+    return results
+
+
+def scaled_return(environment_return: float, *, expert_return: float, random_return: float) -> float:
+    """(R - R_random) / (R_expert - R_random): 0 for a random agent, 1 for the expert, not clipped.
+
+    The three returns must come from episodes of one length.
+
+    Raises:
+        BootifolError: the expert is no better than random, so there is no scale.
+    """
+    if not expert_return > random_return:
+        raise BootifolError(
+            f"returns cannot be scaled: the expert's return {expert_return:g} is not above the random "
+            f"agent's {random_return:g}; measure both again on the same task"
+        )
+    return (environment_return - random_return) / (expert_return - random_return)
+
+
+def summarize(values: ArrayLike, confidence: float = 0.95, resamples: int = 5000, seed: int = 0) -> Summary:
+    """Mean, median, interquartile mean and a percentile bootstrap interval of the mean.
+
+    The same values give the same interval: the resampling has its own generator, from `seed`.
+
+    Raises:
+        BootifolError: there are no values.
+    """
+    sample = np.asarray(values, dtype=np.float64).ravel()
+    if len(sample) == 0:
+        raise BootifolError("there is nothing to summarize: no episode was evaluated; ask for one at least")
+    interval = None
+    if len(sample) > 1:
+        drawn = np.random.default_rng(seed).integers(0, len(sample), size=(resamples, len(sample)))
+        tail = (1.0 - confidence) / 2.0
+        low, high = np.quantile(sample[drawn].mean(axis=1), [tail, 1.0 - tail])
+        interval = (float(low), float(high))
+    return Summary(
+        count=len(sample),
+        mean=float(sample.mean()),
+        median=float(np.median(sample)),
+        interquartile_mean=float(stats.trim_mean(sample, 0.25)),
+        interval=interval,
+    )
+
+
+def evaluation_rows(
+    results: Sequence[EpisodeResult],
+    *,
+    agent_steps: int,
+    seconds: float,
+    episode_steps: int,
+    expert_return: float | None,
+    random_return: float | None,
+) -> list[EvaluationRow]:
+    """The rows of `evaluations.csv` for one evaluation.
+
+    Args:
+        results: from `evaluate`.
+        agent_steps: training so far, in agent steps.
+        seconds: training so far, in wall-clock seconds.
+        episode_steps: length of the episodes in agent steps.
+        expert_return: mean return of the expert over episodes of this length; None where not known.
+        random_return: the same for uniformly random actions.
+    """
+    return [
+        EvaluationRow(
+            agent_steps=agent_steps,
+            seconds=round(seconds, 3),
+            episode_steps=episode_steps,
+            episode=episode,
+            seed=result.seed,
+            environment_return=result.environment_return,
+            scaled_return=None
+            if expert_return is None or random_return is None
+            else scaled_return(
+                result.environment_return, expert_return=expert_return, random_return=random_return
+            ),
+            success=result.success,
+        )
+        for episode, result in enumerate(results)
+    ]

@@ -1,0 +1,163 @@
+"""The result tables of a run, `evaluations.csv` and `ranking.csv`: their columns, writing and reading.
+
+Every write leaves a whole file (written aside, then renamed). Rows measured again at the same agent steps
+replace the old ones, so a run that resumes from a checkpoint repeats its evaluations without doubling them.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from bootifol.errors import BootifolError
+from bootifol.files import written_aside
+
+
+@dataclass(frozen=True)
+class EvaluationRow:
+    """One evaluation episode."""
+
+    agent_steps: int
+    """Agent steps of training when it was played."""
+
+    seconds: float
+    """Wall-clock seconds of training when it was played."""
+
+    episode_steps: int
+    """Length of the episode in agent steps (60 for curves, 500 for tables)."""
+
+    episode: int
+    """Number of the episode within its evaluation, from 0."""
+
+    seed: int
+    """The seed of its start."""
+
+    environment_return: float
+    """Sum of the environment's own rewards."""
+
+    scaled_return: float | None
+    """0 for a random agent, 1 for the expert, unclipped; None where the task has no measured levels."""
+
+    success: bool | None
+    """Whether the task was solved, where it says so."""
+
+
+@dataclass(frozen=True)
+class RankingRow:
+    """The learned reward of one video."""
+
+    agent_steps: int
+    """Agent steps of training when it was measured; 0 is right after alignment."""
+
+    kind: str
+    """What the video shows: expert, half_good, random or agent."""
+
+    video: str
+    """Name of the video."""
+
+    reward: float
+    """The learned reward summed over the video."""
+
+
+Row = TypeVar("Row", EvaluationRow, RankingRow)
+
+
+@dataclass(frozen=True)
+class Table(Generic[Row]):
+    """What a table file holds."""
+
+    rows: list[Row]
+    damaged_lines: list[int]
+    """Numbers of the lines (the header is 1) that could not be read, such as one cut by a crash."""
+
+
+def append_evaluations(path: Path, rows: Sequence[EvaluationRow]) -> None:
+    """Adds rows to `evaluations.csv`; older rows of the same agent steps and episode length are replaced."""
+    replaced = {(row.agent_steps, row.episode_steps) for row in rows}
+    earlier = _rows_so_far(path, EvaluationRow)
+    kept = [row for row in earlier if (row.agent_steps, row.episode_steps) not in replaced]
+    _write(path, EvaluationRow, [*kept, *rows])
+
+
+def append_ranking(path: Path, rows: Sequence[RankingRow]) -> None:
+    """Adds rows to `ranking.csv`; older rows of the same agent steps are replaced."""
+    replaced = {row.agent_steps for row in rows}
+    kept = [row for row in _rows_so_far(path, RankingRow) if row.agent_steps not in replaced]
+    _write(path, RankingRow, [*kept, *rows])
+
+
+def read_evaluations(path: Path) -> Table[EvaluationRow]:
+    """Reads `evaluations.csv`.
+
+    Raises:
+        BootifolError: the file is missing, or its columns are not those of `EvaluationRow`.
+    """
+    return _read(path, EvaluationRow)
+
+
+def read_ranking(path: Path) -> Table[RankingRow]:
+    """Reads `ranking.csv`.
+
+    Raises:
+        BootifolError: the file is missing, or its columns are not those of `RankingRow`.
+    """
+    return _read(path, RankingRow)
+
+
+def _rows_so_far(path: Path, row_type: type[Row]) -> list[Row]:
+    return _read(path, row_type).rows if path.exists() else []
+
+
+def _write(path: Path, row_type: type[Row], rows: Sequence[Row]) -> None:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([field.name for field in fields(row_type)])
+    # Sorted by agent steps: a re-measured evaluation takes the place of the one it replaces.
+    for row in sorted(rows, key=lambda row: row.agent_steps):
+        writer.writerow(["" if value is None else str(value) for value in astuple(row)])
+    with written_aside(path) as aside:
+        aside.write_text(text.getvalue())
+
+
+def _read(path: Path, row_type: type[Row]) -> Table[Row]:
+    columns = [field.name for field in fields(row_type)]
+    readers = [_READERS[str(field.type)] for field in fields(row_type)]
+    try:
+        lines = list(csv.reader(io.StringIO(path.read_text())))
+    except FileNotFoundError:
+        raise BootifolError(f"the table is missing: there is no {path}") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise BootifolError(f"the table cannot be read: {path}: {error}") from error
+    if not lines or lines[0] != columns:
+        raise BootifolError(
+            f"{path} is not a table of this program: its first line must be {','.join(columns)}; "
+            "move the file away to start a new one"
+        )
+    rows: list[Row] = []
+    damaged: list[int] = []
+    for number, line in enumerate(lines[1:], start=2):
+        try:
+            rows.append(row_type(*[read(text) for read, text in zip(readers, line, strict=True)]))
+        except ValueError:
+            damaged.append(number)
+    return Table(rows, damaged)
+
+
+def _truth(text: str) -> bool:
+    if text not in ("True", "False"):
+        raise ValueError(f"neither True nor False: {text}")
+    return text == "True"
+
+
+_READERS: dict[str, Callable[[str], Any]] = {
+    "int": int,
+    "float": float,
+    "str": str,
+    "float | None": lambda text: float(text) if text else None,
+    "bool | None": lambda text: _truth(text) if text else None,
+}
+"""How the text of a column is read, by the annotation of its field."""
