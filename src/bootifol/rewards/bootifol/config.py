@@ -1,0 +1,114 @@
+"""What can be chosen about BootIfOL's reward model; the defaults are the paper's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from bootifol.errors import BootifolError
+
+
+@dataclass(frozen=True)
+class BootifolConfig:
+    """BootIfOL's reward model."""
+
+    reward: Literal["distance", "cosine"] = "distance"
+    """distance (the paper): minus the Euclidean distance between the encodings of agent and expert.
+    cosine (the authors' released code): their cosine similarity, in [-1, 1]."""
+
+    references: int = 1
+    """Expert videos an episode is compared with; the paper compares with one."""
+
+    aggregate: Literal["mean", "min", "soft_min"] = "mean"
+    """Over several references, at every time step: the mean reward, the reward of the nearest reference (min),
+    or a mean that weighs reference i by softmax(reward_i / soft_min_temperature)."""
+
+    soft_min_temperature: float = 0.1
+    """How soft soft_min is, in units of the reward: 0 tends to min, infinity to mean."""
+
+    reward_scale: Literal["none", "alignment"] = "none"
+    """none (the paper), or alignment: rewards are divided by the mean distance, at the same time step, between
+    the expert and the other (random) videos at the end of the Alignment Phase, so that a random episode gets
+    about -1 a step whatever the encoder's units. The constant no longer changes while the agent acts."""
+
+    multiview_weight: float = 1.0
+    """Weight of L_S."""
+
+    triplet_weight: float = 1.0
+    """Weight of L_triplet."""
+
+    autoencoder_weight: float = 1.0
+    """Weight of L_ae; 0 leaves the decoder out."""
+
+    prediction_weight: float = 1.0
+    """Weight of L_Z."""
+
+    sequence_weight: float = 1.0
+    """Weight of L_O."""
+
+    temperature: float = 0.07
+    """tau of the similarity h(a, b) = exp(cos(a, b) / tau)."""
+
+    margin: float = 1.0
+    """rho of L_triplet."""
+
+    window: int = 2
+    """L_triplet: a positive is at most this many frames from its anchor, a negative is farther."""
+
+    predicted_states: int = 2
+    """K of L_Z: how many states are predicted, each from the one before."""
+
+    frame_drop: float = 0.05
+    """Chance that a frame index is left out of a batch, the same indices in all its videos."""
+
+    videos_per_class: int = 16
+    """n: a batch has n expert videos and n others."""
+
+    frames_per_video: int | None = None
+    """Frames of each video on which L_S, L_triplet and L_ae are computed, drawn anew every step; none (the paper)
+    means all. L_Z and L_O always read every frame."""
+
+    width_divisor: int = 1
+    """Divides the channels of the frame encoders and the decoder; 1 is the paper's network."""
+
+    leak: float = 0.2
+    """Slope of LeakyReLU below zero."""
+
+    learning_rate: float = 1e-4
+    """Of Adam."""
+
+    precision: Literal["fp32", "bf16"] = "fp32"
+    """bf16 computes the convolutions in bfloat16; parameters, LSTM, losses and Adam stay in float32."""
+
+    def __post_init__(self) -> None:
+        for field in ("references", "predicted_states", "window", "width_divisor"):
+            if getattr(self, field) < 1:
+                raise BootifolError(
+                    f"reward model: {field} is {getattr(self, field)}, but must be at least 1"
+                )
+        for field in ("temperature", "soft_min_temperature", "learning_rate"):
+            if not getattr(self, field) > 0:
+                raise BootifolError(f"reward model: {field} is {getattr(self, field)}, but must be above 0")
+        for field in ("multiview", "triplet", "autoencoder", "prediction", "sequence"):
+            if not getattr(self, f"{field}_weight") >= 0:
+                raise BootifolError(f"reward model: {field}_weight is negative; use 0 to leave the loss out")
+        if self.videos_per_class < 2:
+            raise BootifolError(
+                f"reward model: videos_per_class is {self.videos_per_class}, but L_O compares an expert video "
+                "with another one, so it must be at least 2"
+            )
+        if not 0 <= self.frame_drop < 1:
+            raise BootifolError(f"reward model: frame_drop is {self.frame_drop}, but must be in [0, 1)")
+        if self.frames_per_video is not None and self.frames_per_video < 1:
+            raise BootifolError(
+                f"reward model: frames_per_video is {self.frames_per_video}; use at least 1, or none for all"
+            )
+        if self.width_divisor > 32:
+            raise BootifolError(
+                f"reward model: width_divisor is {self.width_divisor}, but must be at most 32"
+            )
+        if self.reward_scale == "alignment" and self.reward == "cosine":
+            raise BootifolError(
+                "reward model: reward_scale alignment is for the distance reward; the cosine lies in [-1, 1] already, "
+                "so use reward_scale none"
+            )

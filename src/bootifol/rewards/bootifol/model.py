@@ -1,0 +1,255 @@
+"""BootIfOL's reward model: what `training/` sees of the method (paper, Algorithm 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from bootifol.errors import BootifolError
+from bootifol.networks.color import normalized_lab
+from bootifol.rewards.bootifol import losses
+from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.bootifol.networks import BootifolNetworks
+from bootifol.rewards.bootifol.sampling import Draw, draw
+from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
+from bootifol.types import Arrays, FrameBatch, Frames, Metrics, Rewards, Video, VideoSource
+
+SCALE_MEMORY = 0.98
+"""The scale of `reward_scale: alignment` is an exponential average over about the last 50 alignment steps."""
+
+
+class BootifolRewardModel:
+    """A distance between videos, learned from expert videos and others.
+
+    Args:
+        config: see there.
+        video_size: side of the (square) videos in pixels, 64 in the paper.
+        seed: of the parameters and of every draw.
+        device: where to compute, as PyTorch names it.
+    """
+
+    reads_environment_reward = False
+
+    def __init__(self, config: BootifolConfig, video_size: int, seed: int, device: str = "cpu") -> None:
+        self.config = config
+        self.video_size = video_size
+        self.device = torch.device(device)
+        self.reference_count = config.references
+        self.version = 0
+        # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self.networks = BootifolNetworks(config, video_size)
+        self.networks.to(self.device)
+        self._optimizer = torch.optim.Adam(self.networks.parameters(), lr=config.learning_rate, fused=True)
+        self._rng = np.random.default_rng(seed)
+        self._scale = 0.0
+        self._encodings: dict[str, torch.Tensor] = {}
+
+    def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
+        """Alignment Phase: one gradient step on n expert and n other (random) videos for every item taken."""
+        while True:
+            yield self._step(expert, other, scaling=True)
+
+    def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:
+        """Interactive Phase: the same gradient step, with the agent's own videos as the other class."""
+        return self._step(expert, agent, scaling=self._scale == 0.0)
+
+    def label(self, video: Video, references: Sequence[Video]) -> Rewards:
+        """`r_{t+1} = -||f(o_{0:t+1}) - f(o_{e,0:t+1})||` (Algorithm 1), or the cosine of the two.
+
+        Encodings of the references are kept until the encoders change.
+        """
+        if len(references) != self.reference_count:
+            raise BootifolError(
+                f"the reward model wants {self.reference_count} reference videos, but was given {len(references)}"
+            )
+        length = len(video.frames)
+        for reference in references:
+            if len(reference.frames) < length:
+                raise BootifolError(
+                    f"the expert video {reference.name} has {len(reference.frames)} frames, fewer than the {length} of "
+                    f"{video.name}; record longer expert videos or use shorter episodes"
+                )
+        missing = {item.name: item.frames for item in references if item.name not in self._encodings}
+        fresh = self._encode([video.frames, *missing.values()])
+        self._encodings.update(zip(missing, fresh[1:], strict=True))
+        encoding = fresh[0][1:]
+        compared = torch.stack([self._encodings[item.name][1:length] for item in references])
+        if self.config.reward == "cosine":
+            rewards = torch.nn.functional.cosine_similarity(encoding[None], compared, dim=2)
+        else:
+            rewards = -torch.linalg.vector_norm(encoding[None] - compared, dim=2)
+        reward = self._aggregate(rewards)
+        if self.config.reward_scale == "alignment" and self._scale > 0:
+            reward = reward / self._scale
+        return reward.numpy()
+
+    def embed(self, frames: Frames) -> NDArray[np.float32]:
+        """Encodings z of every prefix of a video: `[T + 1, H, W, 3]` to `[T + 1, 128]`."""
+        encoding: NDArray[np.float32] = self._encode([frames])[0].numpy()
+        return encoding
+
+    def state(self) -> Arrays:
+        """Parameters, BatchNorm statistics, Adam, random state, version and reward scale."""
+        return {
+            **module_state(self.networks, self._optimizer),
+            "random": generator_array(self._rng),
+            "version": np.array([self.version], dtype=np.int64),
+            "reward_scale": np.array([self._scale], dtype=np.float64),
+        }
+
+    def load_state(self, arrays: Arrays) -> None:
+        """Takes over what `state` gave; goes on bit for bit as that model would.
+
+        Raises:
+            BootifolError: an array is missing or has another shape (the run had another configuration).
+        """
+        load_module_state(self.networks, self._optimizer, arrays)
+        load_generator(self._rng, arrays["random"])
+        self.version = int(arrays["version"][0])
+        self._scale = float(arrays["reward_scale"][0])
+        self._encodings.clear()
+
+    def _step(self, expert: VideoSource, other: VideoSource, scaling: bool) -> Metrics:
+        """Algorithm 1: sample n and n videos, evaluate L, optimize theta, gamma, omega, phi."""
+        n = self.config.videos_per_class
+        expert_videos = self._checked(expert.sample(n, self._rng))
+        other_videos = self._checked(other.sample(n, self._rng))
+        length = min(expert_videos.shape[1], other_videos.shape[1])
+        videos = np.concatenate([expert_videos[:, :length], other_videos[:, :length]])
+        drawn = draw(self.config, 2 * n, length, self._rng)
+        statistics = [buffer.clone() for buffer in self.networks.buffers()]
+        self._optimizer.zero_grad(set_to_none=True)
+        total, metrics, distance = self._losses(videos[:, drawn.kept], drawn)
+        try:
+            _refuse_if_not_finite(float(total), self.version, metrics)
+            total.backward()  # type: ignore[no-untyped-call]
+            gradients = [p.grad for p in self.networks.parameters() if p.grad is not None]
+            norm = float(torch.nn.utils.get_total_norm(gradients))
+            _refuse_if_not_finite(norm, self.version, {**metrics, "gradient norm": norm})
+        except BootifolError:
+            for buffer, good in zip(self.networks.buffers(), statistics, strict=True):
+                buffer.copy_(good)
+            raise
+        self._optimizer.step()
+        self.version += 1
+        self._encodings.clear()
+        if scaling:
+            first = self._scale == 0.0
+            self._scale = distance if first else SCALE_MEMORY * self._scale + (1 - SCALE_MEMORY) * distance
+        return metrics
+
+    def _losses(self, videos: FrameBatch, drawn: Draw) -> tuple[torch.Tensor, dict[str, float], float]:
+        """L and its terms on n expert videos followed by n others, uint8 `[2n, T' + 1, H, W, 3]`.
+
+        Returns:
+            L; the metrics; the mean distance of expert and other encodings at the same time step.
+        """
+        config = self.config
+        count, length = videos.shape[:2]
+        lab = self._views(videos.reshape(-1, *videos.shape[2:]))
+        with self._autocast():
+            states = self.networks.frame_encoder(lab).float()
+        within = np.arange(count)[:, None] * length
+        anchors = self._indices(within + drawn.anchors)
+        anchor_states = states[anchors]
+        terms: dict[str, torch.Tensor] = {}
+        weights: dict[str, float] = {}
+
+        half = states.shape[1] // 2
+        if config.multiview_weight > 0:
+            terms["multiview"] = losses.multiview_loss(
+                anchor_states[:, :half], anchor_states[:, half:], config.temperature
+            )
+        if config.triplet_weight > 0:
+            terms["triplet"] = losses.triplet_loss(
+                anchor_states,
+                states[self._indices(within + drawn.positives)],
+                states[self._indices(within + drawn.negatives)],
+                config.margin,
+            )
+        if config.autoencoder_weight > 0:
+            with self._autocast():
+                decoded = self.networks.frame_decoder(anchor_states)
+            every_frame = len(anchors) == len(lab)
+            terms["autoencoder"] = losses.autoencoder_loss(lab if every_frame else lab[anchors], decoded)
+
+        sequences = states.unflatten(0, (count, length))
+        encodings, predicted = self.networks.encode_and_predict(
+            sequences, drawn.start, config.predicted_states
+        )
+        if config.prediction_weight > 0:
+            terms["prediction"] = losses.prediction_loss(
+                predicted, sequences, drawn.start, config.temperature
+            )
+        expert, other = encodings.chunk(2)
+        if config.sequence_weight > 0:
+            terms["sequence"] = losses.sequence_loss(expert[:, -1], other[:, -1], config.temperature)
+
+        weights = {name: getattr(config, f"{name}_weight") for name in terms}
+        total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
+        with torch.no_grad():
+            distance = float(torch.linalg.vector_norm(expert - other, dim=2).mean())
+        metrics = {f"loss/{name}": float(term.detach()) for name, term in terms.items()}
+        return (
+            total,
+            {**metrics, "loss/total": float(total.detach()), "distance/expert_other": distance},
+            distance,
+        )
+
+    def _encode(self, videos: Sequence[Frames]) -> list[torch.Tensor]:
+        """Encodings `[T + 1, 128]` of each video, in evaluation mode: a frame's state depends on that frame alone."""
+        frames = np.concatenate([self._checked(video[None])[0] for video in videos])
+        self.networks.eval()
+        try:
+            with torch.inference_mode():
+                with self._autocast():
+                    states = self.networks.frame_encoder(self._views(frames)).float()
+                parts = states.split([len(video) for video in videos])
+                return [self.networks.sequence_encoder(part[None])[0][0].cpu() for part in parts]
+        finally:
+            self.networks.train()
+
+    def _views(self, frames: Frames) -> torch.Tensor:
+        """uint8 `[N, H, W, 3]` to normalized Lab `[N, 3, H, W]`, channels last in memory."""
+        dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32
+        rgb = torch.from_numpy(np.ascontiguousarray(frames)).to(self.device)
+        return normalized_lab(rgb, dtype).permute(0, 3, 1, 2)
+
+    def _aggregate(self, rewards: torch.Tensor) -> torch.Tensor:
+        """Rewards by reference `[R, T]` to `[T]`."""
+        if self.config.aggregate == "mean":
+            return rewards.mean(0)
+        if self.config.aggregate == "min":
+            return rewards.amax(0)
+        weights = torch.softmax(rewards / self.config.soft_min_temperature, dim=0)
+        return (weights * rewards).sum(0)
+
+    def _autocast(self) -> torch.autocast:
+        return torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.precision == "bf16")
+
+    def _indices(self, indices: NDArray[np.int64]) -> torch.Tensor:
+        return torch.from_numpy(indices.reshape(-1)).to(self.device)
+
+    def _checked(self, videos: FrameBatch) -> FrameBatch:
+        size = self.video_size
+        if videos.ndim != 5 or videos.dtype != np.uint8 or videos.shape[2:] != (size, size, 3):
+            raise BootifolError(
+                f"the reward model reads uint8 videos of {size}x{size} RGB frames, but was given {videos.dtype} "
+                f"{list(videos.shape[1:])}; record or import the videos at that size"
+            )
+        return videos
+
+
+def _refuse_if_not_finite(value: float, version: int, metrics: Metrics) -> None:
+    """Raises before a bad step is taken, so the parameters stay as they were."""
+    if not np.isfinite(value):
+        named = ", ".join(f"{name} {number:.4g}" for name, number in metrics.items())
+        raise BootifolError(
+            f"the reward model's loss is not a finite number at its gradient step {version + 1} ({named}); the step "
+            "was not taken: go on from the last checkpoint with a smaller learning rate"
+        )

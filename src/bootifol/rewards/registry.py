@@ -1,0 +1,47 @@
+"""The reward methods by name. To add one: a folder beside this file, a field and a line here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from bootifol.errors import BootifolError
+from bootifol.rewards.base import RewardModel
+from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.bootifol.model import BootifolRewardModel
+from bootifol.rewards.environment import EnvironmentRewardModel
+
+METHODS = {
+    "bootifol": "imitation from videos by bootstrapped contrastive learning (the paper)",
+    "environment": "the environment's own reward: an upper bound, not imitation",
+}
+"""Every method and what it is."""
+
+
+@dataclass(frozen=True)
+class RewardConfig:
+    """One section a method; only the chosen method's is read."""
+
+    bootifol: BootifolConfig = field(default_factory=BootifolConfig)
+    """BootIfOL's reward model."""
+
+
+def make_reward_model(
+    method: str, config: RewardConfig, video_size: int, seed: int, device: str = "cpu"
+) -> RewardModel:
+    """The reward model of a method.
+
+    Args:
+        method: a key of METHODS.
+        config: of all methods.
+        video_size: side of the videos in pixels.
+        seed: of its parameters and draws.
+        device: where to compute, as PyTorch names it.
+
+    Raises:
+        BootifolError: there is no such method, or it cannot read videos of that size.
+    """
+    if method == "bootifol":
+        return BootifolRewardModel(config.bootifol, video_size, seed, device)
+    if method == "environment":
+        return EnvironmentRewardModel()
+    raise BootifolError(f"there is no reward method {method!r}; choose one of {', '.join(METHODS)}")
