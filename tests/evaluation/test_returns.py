@@ -1,12 +1,10 @@
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 
 from bootifol.envs.rollout import PlayedEpisode
 from bootifol.errors import BootifolError
 from bootifol.evaluation import returns
-from bootifol.evaluation.returns import EpisodeResult, evaluate, evaluation_rows, scaled_return, summarize
+from bootifol.evaluation.returns import EpisodeResult, evaluate, evaluation_rows, scaled_return
 from bootifol.types import Episode, Video
 
 
@@ -35,33 +33,6 @@ def test_scaled_return_is_not_clipped() -> None:
     assert scaled_return(0.0, expert_return=100.0, random_return=10.0) < 0
     with pytest.raises(BootifolError, match="not above the random"):
         scaled_return(1.0, expert_return=5.0, random_return=5.0)
-
-
-def test_summary_by_hand() -> None:
-    summary = summarize([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 99.0])
-    assert summary.count == 8
-    assert summary.mean == 15.0
-    assert summary.median == 3.5
-    assert summary.interquartile_mean == 3.5  # of 2, 3, 4, 5
-
-
-def covered(samples: Sequence[np.ndarray], truth: float) -> float:
-    intervals = [summarize(sample, resamples=400).interval for sample in samples]
-    return float(np.mean([i is not None and i[0] <= truth <= i[1] for i in intervals]))
-
-
-def test_the_interval_covers_the_true_mean_about_as_often_as_it_says() -> None:
-    rng = np.random.default_rng(0)
-    share = covered([rng.normal(2.0, 1.0, 30) for _ in range(300)], 2.0)
-    assert 0.88 < share < 0.98
-
-
-def test_the_interval_repeats_and_needs_two_values() -> None:
-    values = [1.0, 4.0, 2.0]
-    assert summarize(values) == summarize(values)
-    assert summarize([3.0]).interval is None
-    with pytest.raises(BootifolError, match="no episode"):
-        summarize([])
 
 
 def test_rows_hold_scale_and_order() -> None:
