@@ -1,0 +1,97 @@
+"""The agent's own videos, D_a of the paper's Algorithm 1: the newest whole episodes, in memory."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from bootifol.demos.demo_set import draw
+from bootifol.errors import BootifolError
+from bootifol.types import Arrays, FrameBatch, Video
+
+
+class AgentVideos:
+    """A ring of the newest `capacity` episodes of the agent; a `VideoSource`.
+
+        slot        0    1    2    3   …   capacity-1
+        video       7    8    3    4   …              next add overwrites the oldest (3)
+
+    The environment's rewards of a video are not kept: nothing that learns from these videos may read them.
+    """
+
+    def __init__(self, capacity: int, frames: int, size: int) -> None:
+        """Reserves the memory (the system hands it out as episodes arrive).
+
+        Args:
+            capacity: episodes kept (5000 in the paper).
+            frames: frames of an episode, T + 1; a shorter episode stands still on its last frame.
+            size: height and width of a frame in pixels.
+        """
+        if capacity < 1:
+            raise BootifolError(f"the agent's videos need room for at least 1 episode, not {capacity}")
+        self._frames: FrameBatch = np.zeros((capacity, frames, size, size, 3), np.uint8)
+        self._names: list[str] = []
+        self._next = 0
+
+    @staticmethod
+    def bytes_needed(capacity: int, frames: int, size: int) -> int:
+        """Memory of a full ring, in bytes."""
+        return capacity * frames * size * size * 3
+
+    def add(self, video: Video) -> None:
+        """Keeps a video, in the place of the oldest one when full.
+
+        Raises:
+            BootifolError: the video is longer than the ring's episodes, or its pictures have another size.
+        """
+        frames = video.frames
+        if frames.shape[1:] != self._frames.shape[2:] or not 1 <= len(frames) <= self._frames.shape[1]:
+            raise BootifolError(
+                f"the video {video.name} is {list(frames.shape)} and the agent's videos are "
+                f"{list(self._frames.shape[1:])}: make the video size and the episode length agree"
+            )
+        slot = self._frames[self._next]
+        slot[: len(frames)] = frames
+        slot[len(frames) :] = frames[-1]
+        if len(self._names) < len(self._frames):
+            self._names.append(video.name)
+        else:
+            self._names[self._next] = video.name
+        self._next = (self._next + 1) % len(self._frames)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __getitem__(self, index: int) -> Video:
+        """The video in a slot; slots are not in order of age once the ring is full."""
+        if not 0 <= index < len(self):
+            raise IndexError(f"video {index} of {len(self)}")
+        return Video(self._names[index], self._frames[index].copy())
+
+    def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
+        return self._frames[draw(len(self), count, rng)]
+
+    def state(self) -> Arrays:
+        """Frames, names and the next slot; the frames are a view, to be written before the next `add`."""
+        return {
+            "frames": self._frames[: len(self)],
+            "names": np.frombuffer(json.dumps(self._names).encode(), np.uint8),
+            "next": np.array([self._next], np.int64),
+        }
+
+    def load_state(self, arrays: Arrays) -> None:
+        """Continues from `state()` of a ring of the same capacity and size.
+
+        Raises:
+            BootifolError: the arrays come from a ring of another size.
+        """
+        frames = arrays["frames"]
+        if frames.shape[1:] != self._frames.shape[1:] or len(frames) > len(self._frames):
+            raise BootifolError(
+                f"the saved agent videos are {list(frames.shape)} and this run keeps "
+                f"{list(self._frames.shape)}: resume with the configuration of the run that saved them"
+            )
+        self._frames[: len(frames)] = frames
+        self._names = json.loads(arrays["names"].tobytes())
+        self._next = int(arrays["next"][0])

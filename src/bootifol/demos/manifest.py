@@ -1,0 +1,223 @@
+"""What a demo set says about itself: `manifest.json`, read with every field checked."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from bootifol.errors import BootifolError
+from bootifol.files import read_json, write_json
+
+FORMAT = 1
+MANIFEST_NAME = "manifest.json"
+_PACKAGES = ("bootifol", "mujoco", "dm-control", "numpy", "pillow", "av")
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One file of videos, `shard-00000.npy`: uint8 `[videos, T + 1, H, W, 3]`."""
+
+    file: str
+    videos: int
+    bytes: int
+    """Size of the whole file, header included."""
+    sha256: str
+    """Of the whole file, header included."""
+
+
+@dataclass(frozen=True)
+class VideoEntry:
+    """One video of the set. Nothing here tells how well the task was done: recordings carry no rewards."""
+
+    name: str
+    source: dict[str, Any]
+    """Where it comes from: `{"behavior", "seed"}` when recorded, `{"file", "first_frame"}` when imported."""
+    length: int
+    """Frames that were seen. A shorter video stands still on its last frame until the set's length."""
+    sha256: str
+    """Of its pixels `[T + 1, H, W, 3]` in memory order."""
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The contents of `manifest.json`. There is no date in it: the same recording gives the same bytes."""
+
+    name: str
+    """The set's name, from which its videos are named: `<name>-000123`."""
+    complete: bool
+    """False while a recording is under way or was interrupted."""
+    task: str | None
+    """Name in the catalogue of tasks; None for imported videos."""
+    behavior: str
+    """Who performs: expert, half_good, random, still."""
+    seed: int | None
+    """The seed all videos' seeds derive from; None for imported videos."""
+    episodes: int
+    """Videos the complete set has."""
+    frames: int
+    """Frames of a video, T + 1."""
+    video_size: int
+    """Height and width in pixels of the pictures in this set."""
+    agent_size: int | None
+    """The agent's pictures at recording time. One picture is rendered at the larger of the two sizes and
+    resized for the other, so this, too, shows in the pixels."""
+    render_profile: str | None
+    action_repeat: int | None
+    frames_per_second: float | None
+    """Of these videos as time passes in the scene; None when unknown (pictures in a folder)."""
+    conversion: dict[str, Any] | None
+    """For imported videos, how the files became this set; None when recorded."""
+    versions: dict[str, str]
+    shards: tuple[Shard, ...]
+    videos: tuple[VideoEntry, ...]
+
+    def video_name(self, index: int) -> str:
+        return f"{self.name}-{index:06d}"
+
+    @property
+    def video_bytes(self) -> int:
+        return self.frames * self.video_size * self.video_size * 3
+
+
+def installed_versions() -> dict[str, str]:
+    """Versions of what decides the pixels of a recording."""
+    versions = {}
+    for package in _PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return versions
+
+
+def write_manifest(directory: Path, manifest: Manifest) -> None:
+    """Writes `manifest.json` whole or not at all."""
+    write_json(directory / MANIFEST_NAME, {"format": FORMAT, **dataclasses.asdict(manifest)})
+
+
+def read_manifest(directory: Path) -> Manifest:
+    """Reads and checks `manifest.json`.
+
+    Raises:
+        BootifolError: it is missing, no JSON, of another format, lacks a field, or contradicts itself.
+    """
+    path = directory / MANIFEST_NAME
+    value = read_json(path, "the demo set's manifest")
+    if not isinstance(value, dict):
+        raise BootifolError(f"{path} is not a demo set's manifest: it should be a JSON object")
+    if value.get("format") != FORMAT:
+        raise BootifolError(
+            f"{path} has format {value.get('format')!r} and this bootifol reads format {FORMAT}: "
+            "record the set again, or use the version that wrote it"
+        )
+    fields = _Fields(path, value)
+    manifest = Manifest(
+        name=fields.text("name"),
+        complete=fields.boolean("complete"),
+        task=fields.text("task") if value.get("task") is not None else None,
+        behavior=fields.text("behavior"),
+        seed=fields.optional_integer("seed"),
+        episodes=fields.integer("episodes", least=1),
+        frames=fields.integer("frames", least=2),
+        video_size=fields.integer("video_size", least=1),
+        agent_size=fields.optional_integer("agent_size"),
+        render_profile=fields.text("render_profile") if value.get("render_profile") is not None else None,
+        action_repeat=fields.optional_integer("action_repeat"),
+        frames_per_second=fields.optional_number("frames_per_second"),
+        conversion=fields.mapping("conversion") if value.get("conversion") is not None else None,
+        versions=fields.mapping("versions"),
+        shards=tuple(
+            Shard(
+                file=entry.text("file"),
+                videos=entry.integer("videos", least=1),
+                bytes=entry.integer("bytes", least=1),
+                sha256=entry.text("sha256"),
+            )
+            for entry in fields.entries("shards")
+        ),
+        videos=tuple(
+            VideoEntry(
+                name=entry.text("name"),
+                source=entry.mapping("source"),
+                length=entry.integer("length", least=1),
+                sha256=entry.text("sha256"),
+            )
+            for entry in fields.entries("videos")
+        ),
+    )
+    _check_consistent(path, manifest)
+    return manifest
+
+
+def _check_consistent(path: Path, manifest: Manifest) -> None:
+    in_shards = sum(shard.videos for shard in manifest.shards)
+    if in_shards != len(manifest.videos):
+        raise BootifolError(
+            f"{path} contradicts itself: its shards hold {in_shards} videos and it lists "
+            f"{len(manifest.videos)}; record or import the set again"
+        )
+    if manifest.complete and len(manifest.videos) != manifest.episodes:
+        raise BootifolError(
+            f"{path} contradicts itself: it lists {len(manifest.videos)} videos of {manifest.episodes}; "
+            "record or import the set again"
+        )
+    for shard in manifest.shards:
+        if Path(shard.file).name != shard.file:
+            raise BootifolError(f"{path} names a shard outside its own directory: {shard.file!r}")
+    if len({video.name for video in manifest.videos}) != len(manifest.videos):
+        raise BootifolError(f"{path} gives two videos the same name; record or import the set again")
+
+
+class _Fields:
+    """Typed access to one JSON object of a manifest, with an error that names the file and the field."""
+
+    def __init__(self, path: Path, value: dict[str, Any]) -> None:
+        self.path = path
+        self.value = value
+
+    def text(self, key: str) -> str:
+        if not isinstance(found := self.value.get(key), str):
+            raise self._wrong(key, "a text")
+        return found
+
+    def boolean(self, key: str) -> bool:
+        if not isinstance(found := self.value.get(key), bool):
+            raise self._wrong(key, "true or false")
+        return found
+
+    def integer(self, key: str, least: int = 0) -> int:
+        found = self.value.get(key)
+        if not isinstance(found, int) or isinstance(found, bool) or found < least:
+            raise self._wrong(key, f"a whole number of at least {least}")
+        return found
+
+    def optional_integer(self, key: str) -> int | None:
+        return self.integer(key) if self.value.get(key) is not None else None
+
+    def optional_number(self, key: str) -> float | None:
+        found = self.value.get(key)
+        if found is None:
+            return None
+        if not isinstance(found, int | float) or isinstance(found, bool) or not found > 0:
+            raise self._wrong(key, "a positive number")
+        return float(found)
+
+    def mapping(self, key: str) -> dict[str, Any]:
+        if not isinstance(found := self.value.get(key), dict):
+            raise self._wrong(key, "an object")
+        return found
+
+    def entries(self, key: str) -> list[_Fields]:
+        found = self.value.get(key)
+        if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
+            raise self._wrong(key, "a list of objects")
+        return [_Fields(self.path, entry) for entry in found]
+
+    def _wrong(self, key: str, expected: str) -> BootifolError:
+        return BootifolError(
+            f"{self.path} is damaged: {key!r} should be {expected} and is {self.value.get(key)!r}; "
+            "record or import the set again"
+        )
