@@ -1,19 +1,19 @@
 """Replay: every frame stored once, n-step transitions cut out of whole episodes.
 
-Memory is one ring of `capacity` slots. An episode of `T` agent steps takes `T + 1` consecutive slots (modulo the
-capacity), one a frame; the slot of frame `t` also holds action `t` and reward `t`, and the last slot has a frame
-only:
+Memory is one ring of `capacity` slots. An episode of `T` agent steps takes `T + 1` consecutive slots (modulo
+the capacity), one a frame; the slot of frame `t` also holds action `t` and reward `t`, and the last slot has
+a frame only:
 
     slot      0    1    2    3    4    5    6    7    8    9   10   11
     frame   | g2   g3 | h0   h1   h2   h3 | .    . | f0   f1   f2 | g0 ...
     action  | g2   -  | h0   h1   h2   -  | .    . | f0   f1   -  | g0
     reward  | g2   -  | h0   h1   h2   -  | .    . | f0   f1   -  | g0
                                           ^         ^
-                                          head      oldest whole episode (f), then g (wraps around), then h (newest)
+                                          head      oldest (f); next g, which wraps around; newest h
 
-Writing at the head drops the oldest episodes whole, so nothing half overwritten is ever read. A transition is
-`(episode, t)` with `t < T`; its stack repeats frame 0 where the episode had not begun, its next observation is that
-of `min(t + n, T)`. So no batch crosses the border of an episode.
+Writing at the head drops the oldest episodes whole, so nothing half overwritten is ever read. A transition
+is `(episode, t)` with `t < T`; its stack repeats frame 0 where the episode had not begun, its next
+observation is that of `min(t + n, T)`. So no batch crosses the border of an episode.
 """
 
 from __future__ import annotations
@@ -75,8 +75,8 @@ class ReplayBuffer:
             or not 0 <= discount <= 1
         ):
             raise BootifolError(
-                "replay needs a capacity of at least 2, positive frame_size, action_dim, stack and n_step, a shift of "
-                f"at least 0 and a discount in [0, 1]; got capacity={capacity}, frame_size={frame_size}, "
+                "replay needs a capacity of at least 2, positive frame_size, action_dim, stack and n_step, "
+                f"shift >= 0 and a discount in [0, 1]; got capacity={capacity}, frame_size={frame_size}, "
                 f"action_dim={action_dim}, stack={stack}, n_step={n_step}, shift={shift}, discount={discount}"
             )
         self.capacity = capacity
@@ -91,8 +91,8 @@ class ReplayBuffer:
         except MemoryError:
             needed = self.bytes_needed(capacity, frame_size, action_dim)
             raise BootifolError(
-                f"replay of {capacity} frames of {frame_size}x{frame_size} needs {needed / 1e9:.1f} GB, which this "
-                "machine refuses; choose a smaller replay capacity or smaller frames"
+                f"replay of {capacity} frames of {frame_size}x{frame_size} needs {needed / 1e9:.1f} GB, which "
+                "this machine refuses; choose a smaller replay capacity or smaller frames"
             ) from None
         self._episodes: deque[_Stored] = deque()
         self._head = 0
@@ -102,7 +102,7 @@ class ReplayBuffer:
 
     @staticmethod
     def bytes_needed(capacity: int, frame_size: int, action_dim: int) -> int:
-        """Bytes a full buffer takes, known before it takes them (the system hands them out as episodes arrive)."""
+        """Bytes of a full buffer, known before it takes them (the system hands them out as episodes arrive)."""
         return capacity * (_CHANNELS * frame_size**2 + 4 * action_dim + 4)
 
     def __len__(self) -> int:
@@ -125,7 +125,7 @@ class ReplayBuffer:
             The episode's id, one more than that of the episode before.
 
         Raises:
-            BootifolError: sizes that do not fit, more frames than the capacity, or a reward that is not finite.
+            BootifolError: sizes that do not fit, more frames than the capacity, or rewards not finite.
         """
         steps = episode.agent_steps
         slots = steps + 1
@@ -166,7 +166,7 @@ class ReplayBuffer:
         return True
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
-        """Draws transitions uniformly, with replacement; each observation is shifted by its own random offset.
+        """Draws transitions uniformly, with replacement; each observation has its own random shift.
 
         Raises:
             BootifolError: the buffer is empty.
@@ -196,8 +196,8 @@ class ReplayBuffer:
     def state(self) -> Arrays:
         """The written part of the buffer.
 
-        The large arrays are views of the buffer's own memory (a copy could double several GB): write them to a
-        file, or copy them, before the next `add` or `relabel`.
+        The large arrays are views of the buffer's own memory (a copy could double several GB): write them
+        to a file, or copy them, before the next `add` or `relabel`.
         """
         written = slice(self._slots_written)
         return {
@@ -224,8 +224,9 @@ class ReplayBuffer:
             or actions.shape[1:] != self._actions.shape[1:]
         ):
             raise BootifolError(
-                f"the saved replay (frames {frames.shape}, actions {actions.shape}) does not fit a buffer of frames "
-                f"{self._frames.shape} and actions {self._actions.shape}; use the configuration it was saved with"
+                f"the saved replay (frames {frames.shape}, actions {actions.shape}) does not fit a buffer of "
+                f"frames {self._frames.shape} and actions {self._actions.shape}; use the configuration it was "
+                "saved with"
             )
         self._frames[:written] = frames
         self._actions[:written] = actions
@@ -243,7 +244,7 @@ class ReplayBuffer:
         self._index()
 
     def _index(self) -> None:
-        """Rebuilds the arrays by which `sample` turns the number of a transition into an episode and a step."""
+        """Rebuilds the arrays by which `sample` turns a transition's number into an episode and a step."""
         self._starts = np.array([stored.start for stored in self._episodes], dtype=np.int64)
         self._lengths = np.array([stored.agent_steps for stored in self._episodes], dtype=np.int64)
         self._terminated = np.array([stored.terminated for stored in self._episodes], dtype=bool)
@@ -269,13 +270,14 @@ class ReplayBuffer:
         frames, actions = (steps + 1, *self._frames.shape[1:]), (steps, *self._actions.shape[1:])
         if steps < 1 or episode.frames.shape != frames or episode.frames.dtype != np.uint8:
             raise BootifolError(
-                f"an episode of {steps} actions for replay must have at least one action and uint8 frames {frames}, "
-                f"but has {episode.frames.dtype} frames {episode.frames.shape}; check the agent's picture size"
+                f"an episode of {steps} actions for replay must have at least one action and uint8 frames "
+                f"{frames}, but has {episode.frames.dtype} frames {episode.frames.shape}; check the agent's "
+                "picture size"
             )
         if episode.actions.shape != actions or not np.isfinite(episode.actions).all():
             raise BootifolError(
-                f"an episode for replay must have finite actions {actions}, but has {episode.actions.shape} or NaN; "
-                "check the policy that acted"
+                f"an episode for replay must have finite actions {actions}, but has {episode.actions.shape} "
+                "or NaN; check the policy that acted"
             )
         if steps + 1 > self.capacity:
             raise BootifolError(

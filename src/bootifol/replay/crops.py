@@ -1,7 +1,7 @@
-"""Random shift fused with the gather of stacked frames: one pass from the ring of frames to a network's input.
+"""Random shift fused with the gather of stacked frames: one pass from the ring to a network's input.
 
-The random shift is DrQ-v2's augmentation (Yarats et al., 2021, section 3.1): pad by replicating the border, then
-crop at a random whole-pixel offset. Nothing is padded here; the border is replicated while reading.
+The random shift is DrQ-v2's augmentation (Yarats et al., 2021, section 3.1): pad by replicating the border,
+then crop at a random whole-pixel offset. Nothing is padded here; the border is replicated while reading.
 """
 
 from __future__ import annotations

@@ -1,0 +1,346 @@
+"""DrQ-v2: a deterministic actor and twin critics on pixels.
+
+Yarats, Fergus, Lazaric, Pinto: "Mastering Visual Continuous Control: Improved Data-Augmented
+Reinforcement Learning" (2021). Section 3.1 gives the update: the random shift (which replay has already
+applied), n-step clipped double Q-learning, a critic loss that trains the encoder, an actor loss that does
+not, and exploration noise on a linear schedule, which also smooths the targets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from bootifol.agents.networks import Actor, Critic, Encoder, EncoderName, initialize
+from bootifol.errors import BootifolError
+from bootifol.types import Action, Arrays, Batch, Metrics, Observation
+
+
+@dataclass(frozen=True)
+class DrQv2Config:
+    """DrQ-v2; the defaults are those of its paper, with the replay of the BootIfOL paper."""
+
+    encoder: EncoderName = "paper"
+    """Convolutions over the frame stack. paper: four 3x3 layers of 32 channels, strides 2, 1, 1, 1.
+    strided: the same with strides 2, 2, 1, 1. coarse: 8x8 stride 4, 4x4 stride 2, 3x3 (32, 64, 64 channels),
+    the cheapest."""
+
+    feature_dim: int = 50
+    """Width of the trunks between the encoder and the actor's and critic's heads."""
+
+    hidden_dim: int = 1024
+    """Width of the two hidden layers of the actor and of each critic."""
+
+    batch_size: int = 256
+    """Transitions an update learns from."""
+
+    update_every: int = 2
+    """Agent steps an update."""
+
+    n_step: int = 3
+    """Rewards summed before bootstrapping."""
+
+    discount: float = 0.99
+    """Discount of future rewards an agent step."""
+
+    learning_rate: float = 1e-4
+    """Of Adam, for encoder, critic and actor."""
+
+    target_rate: float = 0.01
+    """How far the target critic moves to the critic at each update (tau)."""
+
+    exploration_start: float = 1.0
+    """Standard deviation of the action noise at the first agent step."""
+
+    exploration_end: float = 0.1
+    """Standard deviation of the action noise once exploration_steps have passed."""
+
+    exploration_steps: int = 500_000
+    """Agent steps over which the noise falls linearly."""
+
+    noise_clip: float = 0.3
+    """Largest noise on the actions that the losses evaluate; the actions taken are not so limited."""
+
+    warm_up_steps: int = 1920
+    """Agent steps of uniformly random actions before the first update."""
+
+    replay_capacity: int = 100_000
+    """Frames that replay holds; an episode of T transitions takes T + 1."""
+
+    shift: int = 4
+    """Largest random shift of the pictures in pixels."""
+
+    precision: Literal["bf16", "fp32"] = "bf16"
+    """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""
+
+    def __post_init__(self) -> None:
+        for name in ("feature_dim", "hidden_dim", "batch_size", "update_every", "n_step", "replay_capacity"):
+            if getattr(self, name) < 1:
+                raise BootifolError(f"agent {name} must be at least 1, not {getattr(self, name)}")
+        for name in ("exploration_start", "exploration_end", "exploration_steps", "noise_clip"):
+            if getattr(self, name) < 0:
+                raise BootifolError(f"agent {name} must not be negative, but is {getattr(self, name)}")
+        for name in ("warm_up_steps", "shift"):
+            if getattr(self, name) < 0:
+                raise BootifolError(f"agent {name} must not be negative, but is {getattr(self, name)}")
+        for name in ("discount", "target_rate"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise BootifolError(f"agent {name} must lie in [0, 1], not {getattr(self, name)}")
+        if not self.learning_rate > 0:
+            raise BootifolError(f"agent learning_rate must be positive, not {self.learning_rate}")
+
+    def exploration(self, agent_steps: float) -> float:
+        """Standard deviation of the noise after so many agent steps."""
+        passed = min(agent_steps / self.exploration_steps, 1.0) if self.exploration_steps else 1.0
+        return self.exploration_start + passed * (self.exploration_end - self.exploration_start)
+
+
+def critic_target(reward: Tensor, discount: Tensor, next_q1: Tensor, next_q2: Tensor) -> Tensor:
+    """Clipped double Q-learning: `reward + discount * min(next_q1, next_q2)`, all `[B]`."""
+    return reward + discount * torch.minimum(next_q1, next_q2)
+
+
+def critic_loss(q1: Tensor, q2: Tensor, target: Tensor) -> Tensor:
+    """Mean squared errors of both critics, summed (DrQ-v2, equation 1)."""
+    return nn.functional.mse_loss(q1, target) + nn.functional.mse_loss(q2, target)
+
+
+def actor_loss(q1: Tensor, q2: Tensor) -> Tensor:
+    """Minus the mean of the smaller estimate (DrQ-v2, equation 2)."""
+    return -torch.minimum(q1, q2).mean()
+
+
+def noisy_action(mean: Tensor, stddev: float, clip: float | None, generator: torch.Generator) -> Tensor:
+    """The mean action plus normal noise, cut to [-1, 1].
+
+    Args:
+        mean: `[B, A]` in [-1, 1].
+        stddev: of the noise.
+        clip: largest noise, or None for no limit.
+        generator: where the noise comes from.
+
+    Returns:
+        `[B, A]`. The cut to [-1, 1] is ignored by the gradient: it is that of `mean`, even at the border.
+    """
+    noise = torch.randn(mean.shape, generator=generator, device=mean.device) * stddev
+    if clip is not None:
+        noise = noise.clamp_(-clip, clip)
+    with torch.no_grad():
+        offset = (mean + noise).clamp_(-1.0, 1.0) - mean
+    return mean + offset
+
+
+class DrQv2:
+    """The agent.
+
+    Args:
+        config: hyperparameters.
+        frame_size: height and width of the observations in pixels.
+        stack: frames stacked in an observation.
+        action_dim: action dimensions.
+        seed: of the initial parameters and of the noise.
+        device: where the networks live.
+
+    Raises:
+        BootifolError: the frames are too small for the encoder.
+    """
+
+    def __init__(
+        self,
+        config: DrQv2Config,
+        frame_size: int,
+        stack: int,
+        action_dim: int,
+        seed: int,
+        device: str = "cpu",
+    ) -> None:
+        self.config = config
+        self._device = torch.device(device)
+        with torch.device("meta"):  # torch's own initialization would draw from the global generator
+            self.encoder = Encoder(config.encoder, 3 * stack, frame_size)
+            if self.encoder.feature_count == 0:
+                raise BootifolError(
+                    f"frames of {frame_size}x{frame_size} pixels are too small for the agent's "
+                    f"{config.encoder!r} encoder; make them larger or choose another encoder"
+                )
+            sizes = (self.encoder.feature_count, action_dim, config.feature_dim, config.hidden_dim)
+            self.actor = Actor(*sizes)
+            self.critic = Critic(*sizes)
+            self.target_critic = Critic(*sizes)
+        start = torch.Generator().manual_seed(seed)
+        for network in (self.encoder, self.actor, self.critic, self.target_critic):
+            network.to_empty(device="cpu")
+            initialize(network, start)
+            network.to(self._device)
+        _to_channels_last(self.encoder)
+        self.target_critic.load_state_dict(self.critic.state_dict())
+        self.target_critic.requires_grad_(False)
+        self._generator = torch.Generator(self._device).manual_seed(int(start.initial_seed()) + 1)
+        self._critic_optimizer = torch.optim.Adam(
+            [*self.encoder.parameters(), *self.critic.parameters()], config.learning_rate, fused=True
+        )
+        self._actor_optimizer = torch.optim.Adam(self.actor.parameters(), config.learning_rate, fused=True)
+
+    def act(self, observation: Observation, agent_steps: float, explore: bool) -> Action:
+        """One action.
+
+        Args:
+            observation: uint8 `[S, S, 3 * stack]`.
+            agent_steps: where the noise schedule stands.
+            explore: True adds its noise (and draws uniformly during the warm-up); False returns the mean.
+
+        Returns:
+            float32 `[A]` in [-1, 1].
+        """
+        with torch.inference_mode():
+            if explore and agent_steps < self.config.warm_up_steps:
+                shape = (self.actor.policy.output.out_features,)
+                uniform = torch.rand(shape, generator=self._generator, device=self._device)
+                return _to_numpy(uniform * 2 - 1)
+            picture = torch.from_numpy(observation).to(self._device).permute(2, 0, 1).unsqueeze(0)
+            mean = self.actor(self.encoder(_scaled(picture, torch.float32)))
+            if explore:
+                mean = noisy_action(mean, self.config.exploration(agent_steps), None, self._generator)
+            return _to_numpy(mean[0])
+
+    def update(self, batch: Batch, agent_steps: float) -> Metrics:
+        """One update of critic and encoder, of the actor, and of the target critic, in this order.
+
+        Raises:
+            BootifolError: a loss is NaN or infinite; the parameters are as before the step that failed.
+        """
+        stddev = self.config.exploration(agent_steps)
+        observation = self._network_input(batch.observation)
+        next_observation = self._network_input(batch.next_observation)
+        action, reward, discount = (
+            tensor.to(self._device) for tensor in (batch.action, batch.reward, batch.discount)
+        )
+
+        with torch.no_grad(), self._autocast():
+            next_features = self.encoder(next_observation)
+            next_action = self._noisy(self.actor(next_features), stddev)
+            target = critic_target(reward, discount, *self.target_critic(next_features, next_action))
+        with self._autocast():
+            features = self.encoder(observation)
+            q1, q2 = self.critic(features, action)
+        loss_of_critic = critic_loss(q1, q2, target)
+        self._step(self._critic_optimizer, loss_of_critic, "critic")
+
+        features = features.detach()
+        with torch.no_grad(), self._autocast():
+            trunk = self.critic.trunk(features)
+        self.critic.requires_grad_(False)
+        with self._autocast():
+            loss_of_actor = actor_loss(*self.critic.value(trunk, self._noisy(self.actor(features), stddev)))
+        self.critic.requires_grad_(True)
+        self._step(self._actor_optimizer, loss_of_actor, "actor")
+
+        with torch.no_grad():
+            torch._foreach_lerp_(
+                list(self.target_critic.parameters()), list(self.critic.parameters()), self.config.target_rate
+            )
+        return {
+            "agent/critic_loss": float(loss_of_critic.detach()),
+            "agent/actor_loss": float(loss_of_actor.detach()),
+            "agent/q": float(q1.detach().mean()),
+            "agent/target": float(target.mean()),
+            "agent/batch_reward": float(reward.mean()),
+            "agent/exploration": stddev,
+        }
+
+    def state(self) -> Arrays:
+        """Copies of all parameters, of both optimizers and of the noise generator."""
+        arrays = {name: _copied(parameter) for name, parameter in self._parameters().items()}
+        for name, parameter in self._parameters().items():
+            for key, value in self._optimizer_state(parameter).items():
+                arrays[f"{key}/{name}"] = _copied(value)
+        arrays["generator"] = self._generator.get_state().numpy().copy()
+        return arrays
+
+    def load_state(self, arrays: Arrays) -> None:
+        """Restores what `state` returned, bit for bit.
+
+        Raises:
+            BootifolError: the arrays belong to networks of other sizes.
+        """
+        for name, parameter in self._parameters().items():
+            if name not in arrays or arrays[name].shape != tuple(parameter.shape):
+                raise BootifolError(
+                    f"the saved agent does not fit this one: {name} should be {tuple(parameter.shape)}; "
+                    "use the configuration it was saved with"
+                )
+            with torch.no_grad():
+                parameter.copy_(torch.from_numpy(arrays[name]))
+            state = self._optimizer_state(parameter)
+            state.clear()
+            for key in ("step", "exp_avg", "exp_avg_sq"):
+                if f"{key}/{name}" in arrays:
+                    value = torch.from_numpy(arrays[f"{key}/{name}"].copy()).to(self._device)
+                    state[key] = value.to(memory_format=torch.channels_last) if value.dim() == 4 else value
+        self._generator.set_state(torch.from_numpy(arrays["generator"].copy()))
+
+    def _parameters(self) -> dict[str, Tensor]:
+        networks = {
+            "encoder": self.encoder,
+            "actor": self.actor,
+            "critic": self.critic,
+            "target_critic": self.target_critic,
+        }
+        return {
+            f"{network_name}.{name}": parameter
+            for network_name, network in networks.items()
+            for name, parameter in network.named_parameters()
+        }
+
+    def _optimizer_state(self, parameter: Tensor) -> dict[str, Tensor]:
+        for optimizer in (self._critic_optimizer, self._actor_optimizer):
+            if any(parameter is held for held in optimizer.param_groups[0]["params"]):
+                state: dict[str, Tensor] = optimizer.state[parameter]
+                return state
+        return {}
+
+    def _network_input(self, observation: Tensor) -> Tensor:
+        dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32
+        return _scaled(observation.to(self._device), dtype)
+
+    def _autocast(self) -> torch.autocast:
+        return torch.autocast(self._device.type, torch.bfloat16, enabled=self.config.precision == "bf16")
+
+    def _noisy(self, mean: Tensor, stddev: float) -> Tensor:
+        return noisy_action(mean, stddev, self.config.noise_clip, self._generator)
+
+    @staticmethod
+    def _step(optimizer: torch.optim.Optimizer, loss: Tensor, what: str) -> None:
+        if not torch.isfinite(loss):
+            raise BootifolError(
+                f"the loss of the agent's {what} is {float(loss.detach())}; the rewards may have grown without bound: "
+                "resume from the last checkpoint with a lower learning rate"
+            )
+        optimizer.zero_grad(set_to_none=True)
+        torch.autograd.backward(loss)
+        optimizer.step()
+
+
+def _to_channels_last(network: nn.Module) -> None:
+    for parameter in network.parameters():
+        if parameter.dim() == 4:
+            parameter.data = parameter.data.to(memory_format=torch.channels_last)
+
+
+def _scaled(observation: Tensor, dtype: torch.dtype) -> Tensor:
+    """Uint8 pixels to [-0.5, 0.5]; 127.5 is subtracted first because bfloat16 does that exactly."""
+    return observation.to(dtype, memory_format=torch.channels_last).sub_(127.5).mul_(1 / 255)
+
+
+def _to_numpy(action: Tensor) -> Action:
+    array: Action = action.cpu().numpy()
+    return array
+
+
+def _copied(tensor: Tensor) -> NDArray[np.generic]:
+    return tensor.detach().cpu().numpy().copy()

@@ -1,0 +1,117 @@
+"""The networks of DrQ-v2 (Yarats et al., 2021): image encoder, actor, twin critic, and how they start."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import torch
+from torch import Tensor, nn
+
+EncoderName = Literal["paper", "strided", "coarse"]
+
+_CONVOLUTIONS: dict[EncoderName, tuple[tuple[int, int, int], ...]] = {
+    "paper": ((32, 3, 2), (32, 3, 1), (32, 3, 1), (32, 3, 1)),
+    "strided": ((32, 3, 2), (32, 3, 2), (32, 3, 1), (32, 3, 1)),
+    "coarse": ((32, 8, 4), (64, 4, 2), (64, 3, 1)),
+}
+"""Output channels, kernel size and stride of each convolution; none pads, a ReLU follows each."""
+
+
+class Encoder(nn.Module):
+    """Convolutions over a stack of frames.
+
+    Args:
+        name: which stack of convolutions.
+        channels: `3 * stack`.
+        frame_size: `S`, in pixels.
+    """
+
+    def __init__(self, name: EncoderName, channels: int, frame_size: int) -> None:
+        super().__init__()
+        layers: list[nn.Module] = []
+        size = frame_size
+        for width, kernel, stride in _CONVOLUTIONS[name]:
+            layers += [nn.Conv2d(channels, width, kernel, stride), nn.ReLU(inplace=True)]
+            channels, size = width, (size - kernel) // stride + 1
+        self.convolutions = nn.Sequential(*layers)
+        self.feature_count = channels * max(size, 0) ** 2
+
+    def forward(self, observation: Tensor) -> Tensor:
+        """Features `[B, feature_count]` of observations `[B, 3 * stack, S, S]` scaled to [-0.5, 0.5].
+
+        Flattened rows first, channels last: the order they have in channels-last memory, so nothing is moved.
+        """
+        features: Tensor = self.convolutions(observation)
+        return features.permute(0, 2, 3, 1).flatten(1)
+
+
+class Trunk(nn.Sequential):
+    """Features `[B, feature_count]` squeezed to `[B, feature_dim]` in (-1, 1)."""
+
+    def __init__(self, feature_count: int, feature_dim: int) -> None:
+        super().__init__(nn.Linear(feature_count, feature_dim), nn.LayerNorm(feature_dim), nn.Tanh())
+
+
+class Head(nn.Module):
+    """Two hidden layers; the output is computed in float32 whatever the precision before it.
+
+    A bfloat16 output could not tell a Q of 100.0 from one of 100.4.
+    """
+
+    def __init__(self, inputs: int, hidden_dim: int, outputs: int) -> None:
+        super().__init__()
+        self.hidden = nn.Sequential(
+            nn.Linear(inputs, hidden_dim),
+            nn.ReLU(inplace=True),
+            nn.Linear(hidden_dim, hidden_dim),
+            nn.ReLU(inplace=True),
+        )
+        self.output = nn.Linear(hidden_dim, outputs)
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        hidden = self.hidden(inputs)
+        with torch.autocast(hidden.device.type, enabled=False):
+            output: Tensor = self.output(hidden.float())
+        return output
+
+
+class Actor(nn.Module):
+    """Features to the mean action `[B, A]` in [-1, 1]."""
+
+    def __init__(self, feature_count: int, action_dim: int, feature_dim: int, hidden_dim: int) -> None:
+        super().__init__()
+        self.trunk = Trunk(feature_count, feature_dim)
+        self.policy = Head(feature_dim, hidden_dim, action_dim)
+
+    def forward(self, features: Tensor) -> Tensor:
+        return torch.tanh(self.policy(self.trunk(features)))
+
+
+class Critic(nn.Module):
+    """Two independent estimates of Q, each `[B]`, on one trunk."""
+
+    def __init__(self, feature_count: int, action_dim: int, feature_dim: int, hidden_dim: int) -> None:
+        super().__init__()
+        self.trunk = Trunk(feature_count, feature_dim)
+        self.q1 = Head(feature_dim + action_dim, hidden_dim, 1)
+        self.q2 = Head(feature_dim + action_dim, hidden_dim, 1)
+
+    def forward(self, features: Tensor, action: Tensor) -> tuple[Tensor, Tensor]:
+        return self.value(self.trunk(features), action)
+
+    def value(self, trunk: Tensor, action: Tensor) -> tuple[Tensor, Tensor]:
+        """Q of actions `[B, A]` given the trunk's output `[B, feature_dim]`."""
+        inputs = torch.cat([trunk, action.to(trunk.dtype)], dim=1)
+        return self.q1(inputs).squeeze(1), self.q2(inputs).squeeze(1)
+
+
+def initialize(network: nn.Module, generator: torch.Generator) -> None:
+    """Orthogonal weights, zero biases; gain sqrt(2) for convolutions (a ReLU follows), 1 for linear layers."""
+    for module in network.modules():
+        if isinstance(module, nn.Conv2d | nn.Linear):
+            gain = nn.init.calculate_gain("relu") if isinstance(module, nn.Conv2d) else 1.0
+            nn.init.orthogonal_(module.weight, gain, generator=generator)
+            if module.bias is not None:
+                nn.init.zeros_(module.bias)
+        elif isinstance(module, nn.LayerNorm):
+            module.reset_parameters()
