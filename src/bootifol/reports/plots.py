@@ -1,0 +1,368 @@
+"""The plots of a report: one look, one color per kind.
+
+The palette (from Okabe and Ito's) can be told apart with any color vision: expert dark blue, half-good light
+blue, agent vermilion, random gray.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+from numpy.typing import NDArray
+
+from bootifol.evaluation.summary import summarize
+from bootifol.evaluation.tables import EvaluationRow, RankingRow
+from bootifol.reports.run_files import ALIGNMENT, INTERACTIVE, Curve, RunFiles
+
+KIND_COLORS = {"expert": "#0B5394", "half_good": "#56B4E9", "agent": "#D55E00", "random": "#7A7F87"}
+KIND_NAMES = {"expert": "expert", "half_good": "half-good", "agent": "agent", "random": "random"}
+RUN_COLORS = ("#D55E00", "#009E73", "#AA4499", "#E69F00", "#332288", "#661100")
+RUN_DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
+INK, FAINT, GRID = "#30363D", "#8B929B", "#E7EAEE"
+
+HALF_WIDTH = (5.1, 3.0)
+"""Size in inches of a figure that fills half of the page, or all of a phone."""
+
+# Any, since matplotlib's versions disagree on the type of the keys.
+STYLE: Any = {
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": "#C4C9D0",
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.8,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "xtick.major.size": 3.0,
+    "ytick.major.size": 0.0,
+    "lines.linewidth": 1.7,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "text.color": INK,
+    "figure.facecolor": "white",
+    "svg.fonttype": "none",
+    "svg.hashsalt": "bootifol",
+}
+
+
+@dataclass(frozen=True)
+class RunLook:
+    """How one run is drawn wherever runs are compared: color by method, dashes by seed."""
+
+    run: RunFiles
+    color: str
+    dashes: Any
+
+
+def looks_of(runs: Sequence[RunFiles]) -> list[RunLook]:
+    """Gives every run its look; a single run has the agent's color."""
+    methods = list(dict.fromkeys(run.method for run in runs))
+    seen: dict[str, int] = {}
+    looks = []
+    for run in runs:
+        number = seen.get(run.method, 0)
+        seen[run.method] = number + 1
+        color = RUN_COLORS[methods.index(run.method) % len(RUN_COLORS)]
+        looks.append(RunLook(run, color, RUN_DASHES[number % len(RUN_DASHES)]))
+    return looks
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Figures made inside have the report's look; matplotlib's global settings are left alone."""
+    with mpl.rc_context(STYLE):
+        yield
+
+
+def svg_data_uri(figure: Figure) -> str:
+    """The figure as an SVG data URI. Text stays text, in the reader's own sans-serif font."""
+    buffer = io.BytesIO()
+    with house_style():
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = re.sub(
+        r"(font: [^';\"]*?)'[^;\"]*",
+        r"\1system-ui, 'Segoe UI', Roboto, Arial, sans-serif",
+        buffer.getvalue().decode(),
+    )
+    return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode("ascii")
+
+
+def return_curves(looks: Sequence[RunLook], scaled: bool) -> Figure | None:
+    """Evaluation returns over agent steps, with the levels of expert and random."""
+    with house_style():
+        figure = Figure(figsize=HALF_WIDTH, layout="constrained")
+        return figure if draw_return_curves(figure.add_subplot(), looks, scaled) else None
+
+
+def draw_return_curves(axes: Axes, looks: Sequence[RunLook], scaled: bool) -> bool:
+    """Draws mean and bootstrap interval of each evaluation; False where there is nothing to draw.
+
+    The curve is of the shortest episodes (those evaluated along the way). Where the return is scaled, so that
+    both share one axis, a diamond marks the evaluation on longer ones.
+    """
+    drawn = False
+    levels: tuple[float, float] | None = (0.0, 1.0) if scaled else None
+    for look in looks:
+        lengths = look.run.episode_lengths()
+        if not lengths:
+            continue
+        curve = _evaluation_curve(look.run.evaluations_of(lengths[0]), scaled)
+        if not curve:
+            continue
+        drawn = True
+        levels = levels or look.run.return_levels(lengths[0])
+        steps = np.array([point.agent_steps for point in curve])
+        mean = np.array([point.mean for point in curve])
+        axes.fill_between(
+            steps,
+            [point.low for point in curve],
+            [point.high for point in curve],
+            color=look.color,
+            alpha=0.16 if len(looks) == 1 else 0.09,
+            linewidth=0,
+        )
+        label = "agent" if len(looks) == 1 else look.run.label
+        marker = "o" if len(curve) < 40 else None
+        axes.plot(
+            steps, mean, color=look.color, linestyle=look.dashes, marker=marker, markersize=3, label=label
+        )
+        if len(looks) == 1:
+            _scatter_episodes(axes, look, lengths[0], scaled)
+        if scaled and len(lengths) > 1:
+            _draw_long_evaluations(axes, look, lengths[-1], alone=len(looks) == 1)
+    if not drawn:
+        return False
+    if levels is not None:
+        _draw_levels(axes, *levels)
+    axes.set_ylabel("scaled return" if scaled else "return of an episode")
+    _agent_step_axis(axes)
+    if len(looks) > 1:
+        axes.legend(loc="lower right", ncols=1, handlelength=2.6)
+    return True
+
+
+def learned_reward_curves(looks: Sequence[RunLook]) -> Figure | None:
+    """The learned reward (mean per step) of the agent's training episodes over agent steps."""
+    return _metric_figure(looks, [(INTERACTIVE, "episode/learned_reward")], "learned reward per step")
+
+
+def loss_curves(looks: Sequence[RunLook], name: str) -> Figure | None:
+    """One loss in both phases, side by side: each phase has its own horizontal and vertical scale."""
+    return _metric_figure(looks, [(ALIGNMENT, name), (INTERACTIVE, name)], "loss")
+
+
+def metric_curves(looks: Sequence[RunLook], phase: str, name: str) -> Figure | None:
+    """Any other metric in one phase."""
+    return _metric_figure(looks, [(phase, name)], name.rpartition("/")[2].replace("_", " "))
+
+
+def ranking_plot(rows: Sequence[RankingRow]) -> Figure:
+    """Learned reward of videos by kind: a dot a video, a box over the middle half, a bar at the median."""
+    kinds = [kind for kind in KIND_COLORS if any(row.kind == kind for row in rows)]
+    with house_style():
+        figure = Figure(figsize=(HALF_WIDTH[0], 0.75 + 0.52 * len(kinds)), layout="constrained")
+        axes = figure.add_subplot()
+        jitter = np.random.default_rng(0)
+        for height, kind in enumerate(reversed(kinds)):
+            rewards = np.array([row.reward for row in rows if row.kind == kind])
+            color = KIND_COLORS[kind]
+            low, median, high = np.quantile(rewards, [0.25, 0.5, 0.75])
+            axes.barh(height, high - low, left=low, height=0.56, color=color, alpha=0.20, linewidth=0)
+            axes.plot([median, median], [height - 0.28, height + 0.28], color=color, linewidth=2.2)
+            axes.scatter(
+                rewards,
+                height + jitter.uniform(-0.2, 0.2, len(rewards)),
+                s=13,
+                color=color,
+                alpha=0.75,
+                linewidth=0,
+            )
+        axes.set_yticks(range(len(kinds)), [KIND_NAMES[kind] for kind in reversed(kinds)])
+        axes.set_ylim(-0.55, len(kinds) - 0.45)
+        axes.grid(axis="y", visible=False)
+        axes.grid(axis="x", visible=True)
+        axes.spines["left"].set_visible(False)
+        axes.set_xlabel("learned reward, summed over the video")
+        return figure
+
+
+@dataclass(frozen=True)
+class _Point:
+    agent_steps: int
+    mean: float
+    low: float
+    high: float
+
+
+def _evaluation_curve(grouped: dict[int, list[EvaluationRow]], scaled: bool) -> list[_Point]:
+    points = []
+    for agent_steps, rows in grouped.items():
+        values = _values(rows, scaled)
+        if values:
+            summary = summarize(values, resamples=1000)
+            low, high = summary.interval or (summary.mean, summary.mean)
+            points.append(_Point(agent_steps, summary.mean, low, high))
+    return points
+
+
+def _values(rows: Sequence[EvaluationRow], scaled: bool) -> list[float]:
+    if scaled:
+        return [row.scaled_return for row in rows if row.scaled_return is not None]
+    return [row.environment_return for row in rows]
+
+
+def _scatter_episodes(axes: Axes, look: RunLook, episode_steps: int, scaled: bool) -> None:
+    points = [
+        (agent_steps, value)
+        for agent_steps, rows in look.run.evaluations_of(episode_steps).items()
+        for value in _values(rows, scaled)
+    ]
+    steps, values = zip(*points, strict=True)
+    axes.scatter(steps, values, s=7, color=look.color, alpha=0.22, linewidth=0)
+
+
+def _draw_long_evaluations(axes: Axes, look: RunLook, episode_steps: int, alone: bool) -> None:
+    for point in _evaluation_curve(look.run.evaluations_of(episode_steps), scaled=True):
+        axes.errorbar(
+            point.agent_steps,
+            point.mean,
+            yerr=[[point.mean - point.low], [point.high - point.mean]],
+            color=look.color,
+            marker="D",
+            markersize=6,
+            markeredgecolor="white",
+            elinewidth=1.2,
+            zorder=5,
+            clip_on=False,
+        )
+        if alone:
+            axes.annotate(
+                f"{episode_steps}-step\nepisodes",
+                (point.agent_steps, point.mean),
+                xytext=(-9, -22),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                fontsize=8,
+                color=look.color,
+            )
+
+
+def _draw_levels(axes: Axes, random: float, expert: float) -> None:
+    # The curve starts near random and ends near the expert: the labels stand at the other ends.
+    for kind, level, side, align in (("expert", expert, 0.01, "left"), ("random", random, 0.99, "right")):
+        axes.axhline(level, color=KIND_COLORS[kind], linewidth=1.1, linestyle=(0, (4, 3)), zorder=1)
+        axes.annotate(
+            kind,
+            (side, level),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, 2.5),
+            textcoords="offset points",
+            ha=align,
+            va="bottom",
+            fontsize=8,
+            color=KIND_COLORS[kind],
+        )
+    bottom, top = axes.get_ylim()
+    room = 0.09 * (expert - random)
+    axes.set_ylim(min(bottom, random - room), max(top, expert + 1.5 * room))
+
+
+def _metric_figure(looks: Sequence[RunLook], panels: Sequence[tuple[str, str]], ylabel: str) -> Figure | None:
+    present = [panel for panel in panels if any(_is_drawable(look.run.curve(*panel)) for look in looks)]
+    if not present:
+        return None
+    with house_style():
+        figure = Figure(figsize=HALF_WIDTH, layout="constrained")
+        for number, (phase, name) in enumerate(present):
+            axes = figure.add_subplot(1, len(present), number + 1)
+            for look in looks:
+                curve = look.run.curve(phase, name)
+                if curve is not None and _is_drawable(curve):
+                    _draw_binned(axes, curve, look, alone=len(looks) == 1)
+            if len(panels) > 1:
+                axes.set_title(
+                    "Alignment Phase" if phase == ALIGNMENT else "Interactive Phase",
+                    fontsize=8.5,
+                    loc="left",
+                    color=FAINT,
+                )
+            if number == 0:
+                axes.set_ylabel(ylabel)
+            if name.startswith("loss/") and axes.get_ylim()[0] > 0:
+                axes.set_ylim(bottom=0)
+            if phase == ALIGNMENT:
+                _step_axis(axes, "gradient steps")
+            else:
+                _agent_step_axis(axes)
+        if len(looks) > 1:
+            figure.axes[-1].legend(loc="best", handlelength=2.6)
+        return figure
+
+
+def _is_drawable(curve: Curve | None) -> bool:
+    return curve is not None and len(curve) > 1
+
+
+def _draw_binned(axes: Axes, curve: Curve, look: RunLook, alone: bool) -> None:
+    """The mean of about 100 bins as a line; with one run, the range of each bin's middle 80 % behind it."""
+    steps = _binned(curve, curve.steps, np.mean)
+    axes.plot(
+        steps,
+        _binned(curve, curve.values, np.mean),
+        color=look.color,
+        linestyle=look.dashes,
+        label=look.run.label,
+    )
+    if alone:
+        low = _binned(curve, curve.values, lambda values: np.quantile(values, 0.1))
+        high = _binned(curve, curve.values, lambda values: np.quantile(values, 0.9))
+        axes.fill_between(steps, low, high, color=look.color, alpha=0.16, linewidth=0)
+
+
+def _binned(
+    curve: Curve, values: NDArray[np.float64], reduce: Callable[[NDArray[np.float64]], Any], bins: int = 100
+) -> NDArray[np.float64]:
+    parts = np.array_split(values, min(bins, len(curve)))
+    return np.array([float(reduce(part)) for part in parts])
+
+
+def _agent_step_axis(axes: Axes) -> None:
+    _step_axis(axes, "agent steps")
+
+
+def _step_axis(axes: Axes, label: str) -> None:
+    axes.set_xlabel(label)
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10], integer=True))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: thousands(value)))
+    axes.margins(x=0.02)
+
+
+def thousands(value: float) -> str:
+    """A count, short: 950, 12K, 1.55M."""
+    for size, letter in ((1_000_000, "M"), (1_000, "K")):
+        if abs(value) >= size:
+            return f"{value / size:.2f}".rstrip("0").rstrip(".") + letter
+    return f"{value:g}"

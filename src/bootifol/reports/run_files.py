@@ -1,0 +1,343 @@
+"""Reads a run directory as a report needs it: typed, and tolerant of what is missing or cut.
+
+Only `config.json` is required, since it says what the run is. Everything else may be absent or truncated (a
+run in progress, a crash, a full disk); what could not be read is told in `RunFiles.notes` and in the report.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bootifol.errors import BootifolError
+from bootifol.evaluation.tables import EvaluationRow, RankingRow, Row, Table, read_evaluations, read_ranking
+from bootifol.files import read_arrays, read_json
+from bootifol.types import Arrays, Frames
+
+ALIGNMENT = "alignment"
+INTERACTIVE = "interactive"
+COUNTERS = {ALIGNMENT: "gradient_step", INTERACTIVE: "agent_steps"}
+"""The phases, and what each counts."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A metric over time; only finite values."""
+
+    steps: NDArray[np.float64]
+    """`[N]` gradient steps (alignment) or agent steps (interactive)."""
+
+    values: NDArray[np.float64]
+    """`[N]`."""
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+
+@dataclass(frozen=True)
+class ShowcaseVideo:
+    """One episode of the showcase."""
+
+    kind: str
+    start: int
+    frames: Frames
+    """uint8 `[T + 1, H, W, 3]`."""
+
+    rewards: NDArray[np.float32]
+    """The learned reward `[T]`."""
+
+    environment_return: float | None
+    seed: int | None
+
+
+@dataclass(frozen=True)
+class RunFiles:
+    """What a run directory holds."""
+
+    path: Path
+    task: str
+    method: str
+    preset: str
+    seed: int | None
+    demos: str
+    command: str
+    config: Mapping[str, Any]
+    versions: Mapping[str, str]
+    curves: Mapping[tuple[str, str], Curve]
+    """Metrics by phase and name."""
+
+    seconds: float | None
+    """Wall-clock seconds of training, by the last record that tells them."""
+
+    evaluations: Sequence[EvaluationRow]
+    ranking: Sequence[RankingRow]
+    showcase: Mapping[tuple[str, int], ShowcaseVideo]
+    """By kind and number of the start."""
+
+    video_files: Mapping[tuple[str, int], Path]
+    """mp4 files by kind and number of the start."""
+
+    notes: Sequence[str]
+    """What is missing or damaged, one sentence each."""
+
+    @property
+    def label(self) -> str:
+        """Short name of the run among others of its task."""
+        return self.method if self.seed is None else f"{self.method}, seed {self.seed}"
+
+    @property
+    def agent_steps(self) -> int:
+        """Agent steps of training, by the last record that counts them."""
+        counted = [
+            int(c.steps[-1]) for (phase, _), c in self.curves.items() if phase == INTERACTIVE and len(c)
+        ]
+        return max([0, *counted, *(row.agent_steps for row in self.evaluations)])
+
+    def curve(self, phase: str, name: str) -> Curve | None:
+        """A metric, or None where nothing was recorded."""
+        return self.curves.get((phase, name))
+
+    def starts(self) -> list[int]:
+        """Numbers of the starts of the showcase."""
+        return sorted({start for _, start in self.showcase})
+
+    def episode_lengths(self) -> list[int]:
+        """Lengths of the evaluation episodes, shortest first."""
+        return sorted({row.episode_steps for row in self.evaluations})
+
+    def evaluations_of(self, episode_steps: int) -> dict[int, list[EvaluationRow]]:
+        """Evaluations with episodes of one length, by agent steps of training in rising order."""
+        grouped: dict[int, list[EvaluationRow]] = {}
+        for row in sorted(self.evaluations, key=lambda row: row.agent_steps):
+            if row.episode_steps == episode_steps and np.isfinite(row.environment_return):
+                grouped.setdefault(row.agent_steps, []).append(row)
+        return grouped
+
+    def return_levels(self, episode_steps: int) -> tuple[float, float] | None:
+        """Returns of the random agent and of the expert, recovered from the scale of the evaluations.
+
+        None where no two evaluations of this length have different scaled returns.
+        """
+        rows = [
+            r for rs in self.evaluations_of(episode_steps).values() for r in rs if r.scaled_return is not None
+        ]
+        if not rows:
+            return None
+        low, high = min(rows, key=_scaled), max(rows, key=_scaled)
+        if _scaled(high) - _scaled(low) < 1e-6:
+            return None
+        slope = (high.environment_return - low.environment_return) / (_scaled(high) - _scaled(low))
+        random = low.environment_return - slope * _scaled(low)
+        return random, random + slope
+
+    def ranking_moments(self) -> dict[int, list[RankingRow]]:
+        """Ranked videos by agent steps in rising order; 0 is right after alignment."""
+        grouped: dict[int, list[RankingRow]] = {}
+        for row in sorted(self.ranking, key=lambda row: row.agent_steps):
+            if np.isfinite(row.reward):
+                grouped.setdefault(row.agent_steps, []).append(row)
+        return grouped
+
+
+def read_run(run_dir: Path) -> RunFiles:
+    """Reads a run directory.
+
+    Raises:
+        BootifolError: the directory or its `config.json` is missing, or does not describe a run.
+    """
+    if not run_dir.is_dir():
+        raise BootifolError(f"there is no run directory {run_dir}; give the directory that `train` wrote")
+    config_path = run_dir / "config.json"
+    header = read_json(config_path, f"the configuration of the run {run_dir}")
+    if not isinstance(header, dict) or not isinstance(header.get("task"), str):
+        raise BootifolError(
+            f"{config_path} does not describe a run: it names no task; give the directory that `train` wrote"
+        )
+    notes: list[str] = []
+    curves, metric_seconds = _read_metrics(run_dir / "metrics.jsonl", notes)
+    evaluations = _read_table(run_dir / "evaluations.csv", read_evaluations, "evaluations", notes)
+    ranking = _read_table(run_dir / "ranking.csv", read_ranking, "ranking of held-out videos", notes)
+    showcase = _read_showcase(run_dir / "showcase.safetensors", notes)
+    video_files = _find_videos(run_dir / "videos", notes)
+    seconds = [*metric_seconds, *(row.seconds for row in evaluations)]
+    seed = header.get("seed")
+    return RunFiles(
+        path=run_dir,
+        task=header["task"],
+        method=str(header.get("method", "unknown method")),
+        preset=str(header.get("preset", "unknown preset")),
+        seed=seed if isinstance(seed, int) else None,
+        demos=_as_text(header.get("demos", "")),
+        command=_as_text(header.get("command", "")),
+        config=_as_mapping(header.get("config"), "config", notes),
+        versions={k: str(v) for k, v in _as_mapping(header.get("versions"), "versions", notes).items()},
+        curves=curves,
+        seconds=max(seconds) if seconds else None,
+        evaluations=evaluations,
+        ranking=ranking,
+        showcase=showcase,
+        video_files=video_files,
+        notes=notes,
+    )
+
+
+def _scaled(row: EvaluationRow) -> float:
+    return 0.0 if row.scaled_return is None else row.scaled_return
+
+
+def _as_text(value: object) -> str:
+    """A command or a path, written as text or as a list of arguments."""
+    if isinstance(value, list):
+        return shlex.join(str(part) for part in value)
+    return "" if value is None else str(value)
+
+
+def _as_mapping(value: object, what: str, notes: list[str]) -> dict[str, Any]:
+    if isinstance(value, dict):
+        return value
+    notes.append(f"config.json has no table of {what}.")
+    return {}
+
+
+def _read_metrics(path: Path, notes: list[str]) -> tuple[dict[tuple[str, str], Curve], list[float]]:
+    """Curves by phase and name, and the seconds that were told (the latest of each phase)."""
+    try:
+        lines = path.read_text(errors="replace").splitlines()
+    except OSError:
+        notes.append("metrics.jsonl is missing: no losses and no learned reward over time.")
+        return {}, []
+    points: dict[tuple[str, str], tuple[list[float], list[float]]] = {}
+    seconds: dict[str, float] = {}
+    damaged = dropped = 0
+    for line in lines:
+        record = _parse_record(line)
+        if record is None:
+            damaged += bool(line.strip())
+            continue
+        phase = str(record["phase"])
+        counter = COUNTERS[phase]
+        for name, value in record.items():
+            if name == "seconds" and _is_finite(value):
+                seconds[phase] = max(seconds.get(phase, 0.0), float(value))
+            elif name not in ("phase", counter) and isinstance(value, int | float):
+                if _is_finite(value):
+                    steps, values = points.setdefault((phase, name), ([], []))
+                    steps.append(float(record[counter]))
+                    values.append(float(value))
+                else:
+                    dropped += 1
+    if damaged:
+        notes.append(
+            f"metrics.jsonl: {_count(damaged, 'line')} could not be read, as after an interrupted write."
+        )
+    if dropped:
+        notes.append(
+            f"metrics.jsonl: {_count(dropped, 'value')} that are not finite were left out of the plots."
+        )
+    curves = {}
+    for key, (steps, values) in points.items():
+        order = np.argsort(steps, kind="stable")
+        curves[key] = Curve(np.array(steps)[order], np.array(values)[order])
+    return curves, list(seconds.values())
+
+
+def _parse_record(line: str) -> dict[str, Any] | None:
+    """One line of metrics.jsonl; None where it is not a record with a phase and its counter."""
+    try:
+        record = json.loads(line)
+    except json.JSONDecodeError:
+        return None
+    if not isinstance(record, dict) or record.get("phase") not in COUNTERS:
+        return None
+    return record if _is_finite(record.get(COUNTERS[record["phase"]])) else None
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+
+
+def _read_table(path: Path, read: Callable[[Path], Table[Row]], what: str, notes: list[str]) -> list[Row]:
+    if not path.exists():
+        notes.append(f"{path.name} is missing: no {what}.")
+        return []
+    try:
+        table = read(path)
+    except BootifolError as error:
+        notes.append(f"{path.name} was left out: {error}.")
+        return []
+    if table.damaged_lines:
+        numbers = ", ".join(str(line) for line in table.damaged_lines[:5])
+        notes.append(
+            f"{path.name}: {_count(len(table.damaged_lines), 'line')} could not be read (line {numbers})."
+        )
+    return table.rows
+
+
+def _read_showcase(path: Path, notes: list[str]) -> dict[tuple[str, int], ShowcaseVideo]:
+    if not path.exists():
+        notes.append("showcase.safetensors is missing: no film strips and no reward along videos.")
+        return {}
+    try:
+        arrays = read_arrays(path, "the showcase")
+    except BootifolError as error:
+        notes.append(f"showcase.safetensors was left out: {error}.")
+        return {}
+    showcase: dict[tuple[str, int], ShowcaseVideo] = {}
+    for name in sorted(arrays):
+        match = re.fullmatch(r"frames/([^/]+)/(\d+)", name)
+        if match is None:
+            continue
+        kind, start = match.group(1), int(match.group(2))
+        video = _showcase_video(arrays, kind, start)
+        if video is None:
+            notes.append(
+                f"showcase.safetensors: {kind} {start} was left out: its frames or rewards do not fit."
+            )
+        else:
+            showcase[kind, start] = video
+    return showcase
+
+
+def _showcase_video(arrays: Arrays, kind: str, start: int) -> ShowcaseVideo | None:
+    frames, rewards = arrays[f"frames/{kind}/{start}"], arrays.get(f"reward/{kind}/{start}")
+    if frames.ndim != 4 or frames.shape[-1] != 3 or frames.dtype != np.uint8 or len(frames) < 2:
+        return None
+    if rewards is None or rewards.shape != (len(frames) - 1,):
+        return None
+    returns = arrays.get(f"environment_return/{kind}/{start}")
+    seeds = arrays.get(f"seed/{kind}/{start}")
+    return ShowcaseVideo(
+        kind=kind,
+        start=start,
+        frames=frames.astype(np.uint8, copy=False),
+        rewards=rewards.astype(np.float32),
+        environment_return=None if returns is None or returns.size != 1 else float(returns.ravel()[0]),
+        seed=None if seeds is None or seeds.size != 1 else int(seeds.ravel()[0]),
+    )
+
+
+def _find_videos(directory: Path, notes: list[str]) -> dict[tuple[str, int], Path]:
+    found: dict[tuple[str, int], Path] = {}
+    for path in sorted(directory.glob("*.mp4")):
+        match = re.fullmatch(r"(\w+)-(\d+)\.mp4", path.name)
+        if match is None:
+            continue
+        if path.stat().st_size == 0:
+            notes.append(f"videos/{path.name} is empty.")
+        else:
+            found[match.group(1), int(match.group(2))] = path
+    if not found:
+        notes.append("there are no videos to play.")
+    return found
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
