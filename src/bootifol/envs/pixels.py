@@ -1,0 +1,109 @@
+"""Any simulator as a Gymnasium environment that shows itself in pictures."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+
+from bootifol.envs.pictures import PictureConfig, resize
+from bootifol.types import Action, Frame, Observation
+
+
+class Simulator(Protocol):
+    """What a simulator must offer; everything about pictures, time and repetition is done here once."""
+
+    action_dim: int
+
+    def reset(self, seed: int) -> None:
+        """Draws a start from `seed` alone."""
+        ...
+
+    def step(self, action: Action) -> tuple[float, bool, bool | None]:
+        """One simulator step with an action `[A]` in [-1, 1]: its reward, whether it ended, whether it succeeded."""
+        ...
+
+    def render(self) -> Frame:
+        """The current state, uint8 `[P, P, 3]` where `P` is `PictureConfig.picture_size`."""
+        ...
+
+    def close(self) -> None: ...
+
+
+class PixelEnvironment(gymnasium.Env[Observation, Action]):
+    """A simulator behind the Gymnasium API.
+
+    An observation is the newest `stack` frames along channels, oldest first; after `reset` the first frame is
+    repeated. `info["frame"]` is the newest frame at the agent's size, `info["video_frame"]` at the reward model's.
+
+    Args:
+        simulator: what is shown.
+        pictures: how it is shown.
+        action_repeat: simulator steps an agent step; their rewards are summed.
+        episode_steps: agent steps after which an episode is truncated.
+    """
+
+    def __init__(
+        self, simulator: Simulator, pictures: PictureConfig, action_repeat: int, episode_steps: int
+    ) -> None:
+        self.simulator = simulator
+        self.pictures = pictures
+        self.action_repeat = action_repeat
+        self.episode_steps = episode_steps
+        size = pictures.agent_size
+        self.observation_space = gymnasium.spaces.Box(0, 255, (size, size, 3 * pictures.stack), np.uint8)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (simulator.action_dim,), np.float32)
+        self._frames: deque[Frame] = deque(maxlen=pictures.stack)
+        self._agent_steps = 0
+        self._over = True
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts an episode; the same seed gives the same episode in any process."""
+        super().reset(seed=seed)
+        self.simulator.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
+        self._agent_steps, self._over = 0, False
+        info = self._look()
+        self._frames.extend([info["frame"]] * self.pictures.stack)
+        return self._observation(), info
+
+    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """One agent step.
+
+        Raises:
+            RuntimeError: the episode is over, or was never started.
+        """
+        if self._over:
+            raise RuntimeError("the episode is over: call reset before step")
+        reward, terminated, success = 0.0, False, None
+        clipped = np.clip(action, -1.0, 1.0)
+        for _ in range(self.action_repeat):
+            step_reward, terminated, success = self.simulator.step(clipped)
+            reward += step_reward
+            if terminated:
+                break
+        self._agent_steps += 1
+        truncated = self._agent_steps >= self.episode_steps
+        self._over = terminated or truncated
+        info = self._look()
+        if success is not None:
+            info["success"] = success
+        self._frames.append(info["frame"])
+        return self._observation(), reward, terminated, truncated, info
+
+    def close(self) -> None:
+        """Frees the renderer."""
+        self.simulator.close()
+
+    def _look(self) -> dict[str, Any]:
+        picture = self.simulator.render()
+        return {
+            "frame": resize(picture, self.pictures.agent_size),
+            "video_frame": resize(picture, self.pictures.video_size),
+        }
+
+    def _observation(self) -> Observation:
+        return np.concatenate(self._frames, axis=2)

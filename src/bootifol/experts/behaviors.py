@@ -1,0 +1,69 @@
+"""Who acts in a recording: the expert, someone half as good, someone random, no one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from bootifol.envs.rollout import Act
+from bootifol.types import Action, Observation
+
+Behavior = Literal["expert", "half_good", "random", "still"]
+
+Controller = Callable[[NDArray[np.float64] | None], Action]
+"""A scripted controller: the action toward the task's own goal (None) or toward another point of its space."""
+
+
+class HalfGood:
+    """Does something right but not the task; each episode is one of three kinds, drawn from its seed.
+
+    - the expert until a third of the episode, then random actions;
+    - random actions three steps of four, the expert's in between;
+    - a steady reach to a wrong place.
+
+    Args:
+        controller: the task's expert.
+        environment: what it acts in.
+        seed: of the kinds and of the noise.
+        wrong_goal: draws a wrong place; None for tasks without places.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        environment: gymnasium.Env[Any, Any],
+        seed: int,
+        wrong_goal: Callable[[np.random.Generator], NDArray[np.float64]] | None,
+    ) -> None:
+        self._controller = controller
+        self._steps_of_an_episode: int = environment.unwrapped.episode_steps  # type: ignore[attr-defined]
+        self._rng = np.random.default_rng([seed, 3])
+        self._action_dim = environment.action_space.shape[0]  # type: ignore[index]
+        self._kind = int(self._rng.integers(3 if wrong_goal else 2))
+        self._goal = wrong_goal(self._rng) if wrong_goal else None
+        self._step = 0
+
+    def __call__(self, observation: Observation) -> Action:
+        """One action; the observation is not needed."""
+        self._step += 1
+        noise = self._rng.uniform(-1.0, 1.0, self._action_dim).astype(np.float32)
+        if self._kind == 0:
+            return self._controller(None) if self._step <= self._steps_of_an_episode // 3 else noise
+        if self._kind == 1:
+            return noise if self._rng.random() < 0.75 else self._controller(None)
+        return self._controller(self._goal)
+
+
+def random_actions(action_dim: int, seed: int) -> Act:
+    """Uniformly random actions in [-1, 1]."""
+    rng = np.random.default_rng([seed, 4])
+    return lambda observation: rng.uniform(-1.0, 1.0, action_dim).astype(np.float32)
+
+
+def no_actions(action_dim: int) -> Act:
+    """Zeros."""
+    return lambda observation: np.zeros(action_dim, np.float32)

@@ -1,0 +1,45 @@
+"""A scripted expert for DeepMind Control's reacher: two-link inverse kinematics and a damped spring."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+LINK = 0.12
+"""Length of each of the arm's two links, in meters."""
+
+STIFFNESS, DAMPING = 4.0, 0.5
+"""Torque (in units of its limit) per radian of error, and per radian a second."""
+
+
+def torques(physics: Any, goal: NDArray[np.float64]) -> NDArray[np.float32]:
+    """The action `[2]` that brings the fingertip to `goal` `[2]`, a point in meters."""
+    angles = physics.data.qpos[:2]
+    velocities = physics.data.qvel[:2]
+    error = _nearest_angles(goal, angles) - angles
+    error[0] = _wrapped(error[0])
+    return np.clip(STIFFNESS * error - DAMPING * velocities, -1.0, 1.0).astype(np.float32)
+
+
+def target_position(physics: Any) -> NDArray[np.float64]:
+    """Where the target lies, `[2]` in meters."""
+    position: NDArray[np.float64] = physics.named.data.geom_xpos["target", :2].copy()
+    return position
+
+
+def _nearest_angles(goal: NDArray[np.float64], angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The joint angles that reach `goal`: of the two elbow bends, the one closer to where the arm is."""
+    distance = min(float(np.hypot(*goal)), 2 * LINK - 1e-4)
+    bend = float(np.arccos(np.clip(distance**2 / (2 * LINK**2) - 1.0, -1.0, 1.0)))
+    solutions = [
+        np.array([np.arctan2(goal[1], goal[0]) - elbow / 2, elbow], dtype=np.float64)
+        for elbow in (bend, -bend)
+    ]
+    return min(solutions, key=lambda s: abs(_wrapped(s[0] - angles[0])) + abs(s[1] - angles[1]))
+
+
+def _wrapped(angle: float) -> float:
+    """The same angle in [-π, π)."""
+    return float((angle + np.pi) % (2 * np.pi) - np.pi)
