@@ -21,7 +21,7 @@ WriteSet = Callable[..., Path]
 
 
 def set_writer(root: Path) -> WriteSet:
-    """A function that writes a complete demo set of `videos`, `per_shard` a file, and returns its directory."""
+    """A function that writes a complete set of `videos`, `per_shard` a file, and returns its directory."""
 
     def write(videos: np.ndarray, name: str = "drawn-expert", per_shard: int = 3, **fields: object) -> Path:
         directory = root / name

@@ -69,6 +69,11 @@ class AgentVideos:
             raise IndexError(f"video {index} of {len(self)}")
         return Video(self._names[index], self._frames[index].copy())
 
+    def newest(self, count: int) -> list[Video]:
+        """The newest `count` videos, or all if there are fewer; oldest first."""
+        count = min(count, len(self))
+        return [self[(self._next - count + offset) % len(self._frames)] for offset in range(count)]
+
     def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
         return self._frames[draw(len(self), count, rng)]
 

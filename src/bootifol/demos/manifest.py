@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -73,9 +74,6 @@ class Manifest:
     versions: dict[str, str]
     shards: tuple[Shard, ...]
     videos: tuple[VideoEntry, ...]
-
-    def video_name(self, index: int) -> str:
-        return f"{self.name}-{index:06d}"
 
     @property
     def video_bytes(self) -> int:
@@ -165,8 +163,8 @@ def _check_consistent(path: Path, manifest: Manifest) -> None:
             "record or import the set again"
         )
     for shard in manifest.shards:
-        if Path(shard.file).name != shard.file:
-            raise BootifolError(f"{path} names a shard outside its own directory: {shard.file!r}")
+        if not re.fullmatch(r"shard-\d{5}\.npy", shard.file):
+            raise BootifolError(f"{path} names a file that is no shard of its own: {shard.file!r}")
     if len({video.name for video in manifest.videos}) != len(manifest.videos):
         raise BootifolError(f"{path} gives two videos the same name; record or import the set again")
 

@@ -19,8 +19,8 @@ from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.types import FrameBatch, Frames
 
-# Small enough that an interrupted recording loses seconds; few enough that a set's maps stay far below the
-# usual limit of 1024 open files (each map holds one).
+# Each open map holds one of the usual 1024 file descriptors, so a set has few shards; and a shard is what an
+# interrupted recording loses, so they are small.
 _SHARD_BYTES = 16 * 2**20
 _MOST_SHARDS = 128
 
@@ -30,8 +30,15 @@ def shard_name(index: int) -> str:
     return f"shard-{index:05d}.npy"
 
 
-def videos_per_shard(episodes: int, video_bytes: int) -> int:
-    """How many videos each file of a set holds."""
+def shard_number(name: str) -> int:
+    """7 for `shard-00007.npy`."""
+    return int(name.removeprefix("shard-").removesuffix(".npy"))
+
+
+def videos_per_shard(episodes: int | None, video_bytes: int) -> int:
+    """How many videos each file of a set holds; `episodes` is None when their number is not known yet."""
+    if episodes is None:
+        return max(1, 8 * _SHARD_BYTES // video_bytes)
     return min(episodes, max(1, _SHARD_BYTES // video_bytes, math.ceil(episodes / _MOST_SHARDS)))
 
 
@@ -94,3 +101,8 @@ def sha256_of_file(path: Path) -> str:
 def sha256_of_frames(frames: Frames) -> str:
     """Hexadecimal SHA-256 of the pixels in memory order."""
     return hashlib.sha256(np.ascontiguousarray(frames).data).hexdigest()
+
+
+def last_frame_held(frames: Frames, length: int) -> Frames:
+    """A video `[n, H, W, 3]` made `length` frames long by repeating its last one; `n` is at most `length`."""
+    return np.concatenate([frames, np.repeat(frames[-1:], length - len(frames), axis=0)])

@@ -1,0 +1,206 @@
+"""People's own video files become a demo set: one frame rate, length and size, all of it written down."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from bootifol.demos.contact_sheet import write_contact_sheet
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.manifest import Manifest, Shard, VideoEntry, installed_versions, write_manifest
+from bootifol.demos.shards import (
+    last_frame_held,
+    sha256_of_frames,
+    videos_per_shard,
+    write_shard,
+)
+from bootifol.demos.video_files import TimedFrame, frame_rate, stream_video
+from bootifol.envs.pictures import resize
+from bootifol.errors import BootifolError
+from bootifol.files import written_aside
+from bootifol.progress import progress
+from bootifol.types import Frame, Frames
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """How video files become videos of one length and size."""
+
+    frames: int = 61
+    """Frames of every video in the set, T + 1; make it the task's agent steps per episode plus 1."""
+
+    size: int = 64
+    """Height and width of the pictures in pixels; the largest centered square is cut out and resized."""
+
+    frames_per_second: float | None = None
+    """Pictures per second to resample to (the picture showing at each instant); None keeps every picture."""
+
+    windows: Literal["all", "first"] = "all"
+    """`all` cuts a long file into one video after another and drops an unfinished last one; `first` takes
+    its beginning only. A file shorter than one video stands still on its last picture."""
+
+    def __post_init__(self) -> None:
+        if self.frames < 2:
+            raise BootifolError(f"a video needs at least 2 frames, not {self.frames}")
+        if self.size < 1:
+            raise BootifolError(f"pictures need a size of at least 1 pixel, not {self.size}")
+        if self.frames_per_second is not None and not self.frames_per_second > 0:
+            raise BootifolError(f"frames per second must be positive, not {self.frames_per_second}")
+
+
+def import_videos(
+    files: Sequence[Path],
+    out: Path | str,
+    conversion: Conversion | None = None,
+    behavior: str = "expert",
+    name: str | None = None,
+) -> DemoSet:
+    """Writes a demo set from video files; the set appears whole or not at all.
+
+    Args:
+        files: video files, folders of pictures (each folder one video) and .npy arrays.
+        out: directory of the set; it must not exist.
+        conversion: frame rate, length and size of the result.
+        behavior: what the videos show.
+        name: of the set; `<directory above>-<behavior>` by default.
+
+    Raises:
+        BootifolError: `out` exists, or files are empty, damaged or truncated (all such files are named).
+    """
+    conversion = conversion or Conversion()
+    out = Path(out)
+    if out.exists():
+        raise BootifolError(f"{out} exists already: choose another directory or remove it")
+    if not files:
+        raise BootifolError("there are no videos to import: name files, or folders of pictures")
+    name = name or f"{out.resolve().parent.name}-{behavior}"
+    with written_aside(out) as aside:
+        aside.mkdir()
+        _write_set(aside, files, conversion, behavior, name)
+        write_contact_sheet(aside, DemoSet.open(aside))
+    return DemoSet.open(out)
+
+
+def convert(path: Path, conversion: Conversion) -> Iterator[Frames]:
+    """The windows of one video file, uint8 `[n, size, size, 3]`; only the last may have `n` below `frames`.
+
+    Raises:
+        BootifolError: the file cannot be read to its end, or has no times to resample by.
+    """
+    window: list[Frame] = []
+    windows = 0
+    for frame in _resampled(path, conversion.frames_per_second):
+        if conversion.windows == "first" and windows:
+            continue  # still read to the end, so that a truncated file is noticed
+        window.append(centered_square(frame, conversion.size))
+        if len(window) == conversion.frames:
+            yield np.stack(window)
+            windows += 1
+            window = []
+    if window and not windows:
+        yield np.stack(window)
+
+
+def centered_square(frame: Frame, size: int) -> Frame:
+    """The largest centered square of a picture `[H, W, 3]`, resized to `[size, size, 3]`."""
+    height, width, _ = frame.shape
+    side = min(height, width)
+    top, left = (height - side) // 2, (width - side) // 2
+    return resize(frame[top : top + side, left : left + side], size)
+
+
+def _resampled(path: Path, frames_per_second: float | None) -> Iterator[Frame]:
+    """The pictures showing at 0, 1/fps, 2/fps … seconds; every picture when no rate is asked for."""
+    if frames_per_second is None:
+        yield from (timed.frame for timed in stream_video(path))
+        return
+    showing: Frame | None = None
+    since = gap = 0.0
+    emitted = 0
+    for timed in stream_video(path):
+        seconds = _seconds(path, timed)
+        if showing is not None:
+            gap = seconds - since
+            for _ in range(emitted, _instants_before(seconds, frames_per_second)):
+                yield showing
+                emitted += 1
+        showing, since = timed.frame, seconds
+    if showing is not None:  # the last picture shows as long as the one before it did
+        for _ in range(emitted, max(1, _instants_before(since + gap, frames_per_second))):
+            yield showing
+
+
+def _instants_before(seconds: float, frames_per_second: float) -> int:
+    """How many of 0, 1/fps, 2/fps … lie before a time; half a millisecond absorbs rounded time stamps."""
+    return max(0, math.ceil((seconds - 0.0005) * frames_per_second))
+
+
+def _seconds(path: Path, timed: TimedFrame) -> float:
+    if timed.seconds is None:
+        raise BootifolError(
+            f"{path} has no times to resample by (only video files do): import it without --fps"
+        )
+    return timed.seconds
+
+
+def _write_set(
+    directory: Path, files: Sequence[Path], conversion: Conversion, behavior: str, name: str
+) -> None:
+    video_bytes = conversion.frames * conversion.size**2 * 3
+    per_shard = videos_per_shard(None, video_bytes)
+    shards: list[Shard] = []
+    entries: list[VideoEntry] = []
+    waiting: list[Frames] = []
+    problems: list[str] = []
+    with progress("importing", total=len(files)) as advance:
+        for path in files:
+            try:
+                for window, frames in enumerate(convert(path, conversion)):
+                    padded = last_frame_held(frames, conversion.frames)
+                    entries.append(
+                        VideoEntry(
+                            name=f"{name}-{len(entries):06d}",
+                            source={"file": path.name, "first_frame": window * conversion.frames},
+                            length=len(frames),
+                            sha256=sha256_of_frames(padded),
+                        )
+                    )
+                    waiting.append(padded)
+                    if len(waiting) == per_shard:
+                        shards.append(write_shard(directory, len(shards), np.stack(waiting)))
+                        waiting = []
+            except BootifolError as error:
+                problems.append(str(error))
+            advance(videos=str(len(entries)))
+    if problems:
+        raise BootifolError("\n".join(problems))
+    if waiting:
+        shards.append(write_shard(directory, len(shards), np.stack(waiting)))
+    rates = {conversion.frames_per_second} if conversion.frames_per_second else {frame_rate(f) for f in files}
+    write_manifest(
+        directory,
+        Manifest(
+            name=name,
+            complete=True,
+            task=None,
+            behavior=behavior,
+            seed=None,
+            episodes=len(entries),
+            frames=conversion.frames,
+            video_size=conversion.size,
+            agent_size=None,
+            render_profile=None,
+            action_repeat=None,
+            frames_per_second=rates.pop() if len(rates) == 1 else None,
+            conversion=dataclasses.asdict(conversion) | {"crop": "largest centered square"},
+            versions=installed_versions(),
+            shards=tuple(shards),
+            videos=tuple(entries),
+        ),
+    )

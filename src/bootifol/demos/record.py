@@ -1,0 +1,284 @@
+"""Recording a demo set: episodes of one behavior, played in the task's environment, pictures only."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import multiprocessing
+import os
+import shutil
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, get_args
+
+import gymnasium
+import numpy as np
+
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.manifest import (
+    MANIFEST_NAME,
+    Manifest,
+    Shard,
+    VideoEntry,
+    installed_versions,
+    read_manifest,
+    write_manifest,
+)
+from bootifol.demos.shards import (
+    last_frame_held,
+    sha256_of_file,
+    sha256_of_frames,
+    shard_number,
+    videos_per_shard,
+    write_shard,
+)
+from bootifol.envs.pictures import PictureConfig
+from bootifol.envs.rollout import play_episode
+from bootifol.errors import BootifolError
+from bootifol.experts import Behavior, make_behavior
+from bootifol.progress import progress
+from bootifol.tasks import make_environment, task_named
+from bootifol.types import Frames
+
+
+@dataclasses.dataclass(frozen=True)
+class Recording:
+    """What decides every byte of a recorded set (together with the versions of the libraries)."""
+
+    task: str
+    behavior: Behavior
+    episodes: int
+    pictures: PictureConfig
+    seed: int
+    episode_steps: int
+
+    def video_seed(self, index: int) -> int:
+        """The seed of one video, below 2^31.
+
+        It does not depend on the behavior: video 7 of the expert and video 7 of the random set begin alike,
+        so that no learner can tell the two sets apart by their first frames.
+        """
+        return int(np.random.SeedSequence([self.seed, index]).generate_state(1)[0] >> 1)
+
+
+def record(
+    task: str,
+    behavior: Behavior,
+    episodes: int,
+    out: Path | str,
+    pictures: PictureConfig,
+    seed: int = 1,
+    episode_steps: int | None = None,
+    workers: int = 1,
+) -> DemoSet:
+    """Records a demo set, or goes on with one that was interrupted.
+
+    The bytes depend on the arguments only: not on interruptions, and not on the number of workers. Files
+    appear whole or not at all, so this may be stopped at any moment.
+
+    Args:
+        task: name in the catalogue of tasks.
+        behavior: "expert", "half_good", "random" or "still".
+        episodes: number of videos.
+        out: directory of the set.
+        pictures: sizes and render profile; the set holds pictures of `video_size`.
+        seed: every video's seed derives from it and the video's index.
+        episode_steps: agent steps of a video (T), the task's training episode by default.
+        workers: processes that play episodes; 1 plays them in this one.
+
+    Raises:
+        BootifolError: another set is there already, the disk is too small, or a name is unknown.
+    """
+    if workers < 1 or episodes < 1:
+        raise BootifolError(f"episodes and workers must be at least 1, not {episodes} and {workers}")
+    if behavior not in get_args(Behavior):
+        raise BootifolError(
+            f"there is no behavior '{behavior}'; choose among {', '.join(get_args(Behavior))}"
+        )
+    if behavior in ("expert", "half_good") and not task_named(task).has_expert:
+        raise BootifolError(
+            f"no expert is bundled for {task}: import videos of it with `bootifol demos import`, and record "
+            "the other behaviors with `--behaviors random`"
+        )
+    out = Path(out)
+    steps = task_named(task).episode_steps if episode_steps is None else episode_steps
+    plan = Recording(task, behavior, episodes, pictures, seed, steps)
+    manifest = _begin(out, plan)
+    per_shard = videos_per_shard(episodes, manifest.video_bytes)
+    finished = _whole_shards(out, manifest)
+    missing = [index for index in range(math.ceil(episodes / per_shard)) if index not in finished]
+    if missing:
+        _check_versions(out, manifest)
+        _check_disk(out, len(missing) * per_shard * manifest.video_bytes)
+        done = sum(shard.videos for shard, _ in finished.values())
+        with (
+            progress(f"recording {manifest.name}", episodes, done) as advance,
+            _players(plan, workers) as play,
+        ):
+            for index in missing:
+                indices = range(index * per_shard, min((index + 1) * per_shard, episodes))
+                videos: list[Frames] = []
+                entries: list[VideoEntry] = []
+                for number, frames in zip(indices, play(indices), strict=True):
+                    videos.append(last_frame_held(frames, manifest.frames))
+                    entries.append(_entry(plan, manifest, number, len(frames), videos[-1]))
+                    advance()
+                finished[index] = (write_shard(out, index, np.stack(videos)), entries)
+                manifest = _with_shards(manifest, finished)
+                write_manifest(out, manifest)
+    return DemoSet.open(out)
+
+
+def play(plan: Recording, index: int) -> Frames:
+    """One video of the set, uint8 `[n, H, W, 3]` with `n` at most T + 1; the same in any process."""
+    environment = _environment(plan.task, plan.pictures, plan.episode_steps)
+    seed = plan.video_seed(index)
+    environment.reset(seed=seed)  # a half-good performer looks at the start to choose what to do wrong
+    act = make_behavior(plan.behavior, plan.task, environment, seed)
+    return play_episode(environment, act, seed, name="recorded").episode.video.frames
+
+
+@cache
+def _environment(task: str, pictures: PictureConfig, episode_steps: int) -> gymnasium.Env[Any, Any]:
+    """Kept until the process ends: freeing a renderer can spoil the pictures of the next one."""
+    return make_environment(task, pictures, episode_steps)
+
+
+def _begin(out: Path, plan: Recording) -> Manifest:
+    """The manifest to go on with: that of the recording in `out`, or a new one without videos."""
+    new = Manifest(
+        name=f"{plan.task}-{plan.behavior}",
+        complete=False,
+        task=plan.task,
+        behavior=plan.behavior,
+        seed=plan.seed,
+        episodes=plan.episodes,
+        frames=plan.episode_steps + 1,
+        video_size=plan.pictures.video_size,
+        agent_size=plan.pictures.agent_size,
+        render_profile=plan.pictures.profile,
+        action_repeat=task_named(plan.task).action_repeat,
+        frames_per_second=_environment(plan.task, plan.pictures, plan.episode_steps).metadata.get(
+            "render_fps"
+        ),
+        conversion=None,
+        versions=installed_versions(),
+        shards=(),
+        videos=(),
+    )
+    if not (out / MANIFEST_NAME).exists():
+        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+            raise BootifolError(
+                f"{out} is there already and holds no demo set: choose another directory or remove it"
+            )
+        write_manifest(out, new)
+        return new
+    there = read_manifest(out)
+    for field in dataclasses.fields(Manifest):
+        if field.name in ("complete", "versions", "shards", "videos"):
+            continue
+        old, wanted = getattr(there, field.name), getattr(new, field.name)
+        if old != wanted:
+            raise BootifolError(
+                f"{out} holds another demo set (its {field.name} is {old!r}, not {wanted!r}): "
+                "choose another directory or remove it"
+            )
+    for half_written in out.glob(".*.tmp"):  # left by a process that was killed
+        half_written.unlink()
+    return there
+
+
+def _whole_shards(out: Path, manifest: Manifest) -> dict[int, tuple[Shard, Sequence[VideoEntry]]]:
+    """The finished shards whose bytes are still the ones that were written, by their number."""
+    whole: dict[int, tuple[Shard, Sequence[VideoEntry]]] = {}
+    first = 0
+    for shard in manifest.shards:
+        entries = manifest.videos[first : first + shard.videos]
+        first += shard.videos
+        path = out / shard.file
+        if path.is_file() and sha256_of_file(path) == shard.sha256:
+            whole[shard_number(shard.file)] = (shard, entries)
+    return whole
+
+
+def _with_shards(manifest: Manifest, finished: dict[int, tuple[Shard, Sequence[VideoEntry]]]) -> Manifest:
+    in_order = [finished[index] for index in sorted(finished)]
+    videos = tuple(entry for _, entries in in_order for entry in entries)
+    return dataclasses.replace(
+        manifest,
+        complete=len(videos) == manifest.episodes,
+        shards=tuple(shard for shard, _ in in_order),
+        videos=videos,
+    )
+
+
+def _entry(plan: Recording, manifest: Manifest, index: int, length: int, frames: Frames) -> VideoEntry:
+    return VideoEntry(
+        name=f"{manifest.name}-{index:06d}",
+        source={"behavior": plan.behavior, "seed": plan.video_seed(index)},
+        length=length,
+        sha256=sha256_of_frames(frames),
+    )
+
+
+def _check_versions(out: Path, manifest: Manifest) -> None:
+    installed = installed_versions()
+    for package in sorted(manifest.versions.keys() | installed.keys()):
+        old, new = manifest.versions.get(package), installed.get(package)
+        if old != new:
+            raise BootifolError(
+                f"the recording in {out} was begun with {package} {old} and this is {package} {new}, whose "
+                "pictures may differ: install that version again, or remove the directory and start anew"
+            )
+
+
+def _check_disk(out: Path, needed: int) -> None:
+    free = shutil.disk_usage(out).free
+    if needed > free:
+        raise BootifolError(
+            f"{out} needs {needed / 1e9:.1f} GB more and the disk has {free / 1e9:.1f} GB free: "
+            "free some space or choose another directory"
+        )
+
+
+Play = Callable[[Iterable[int]], Iterable[Frames]]
+
+
+@contextmanager
+def _players(plan: Recording, workers: int) -> Iterator[Play]:
+    """Plays the videos of the given indices and yields their frames in that order, in `workers` processes."""
+    if workers == 1:
+        yield lambda indices: map(partial(play, plan), indices)
+        return
+    # Spawned, not forked: a forked copy of an OpenGL context or of torch's threads may hang.
+    pool = ProcessPoolExecutor(
+        workers, mp_context=multiprocessing.get_context("spawn"), initializer=_follow_parent
+    )
+    try:
+        yield lambda indices: pool.map(partial(play, plan), indices)
+    except BrokenProcessPool as error:
+        raise BootifolError(
+            "a worker process died while recording (out of memory, or OpenGL crashed): run the same command "
+            "again, with --workers 1 if it happens again"
+        ) from error
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _follow_parent() -> None:
+    """A worker leaves Ctrl-C to its parent, and ends when the parent is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def wait() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()

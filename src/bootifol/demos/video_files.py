@@ -1,0 +1,234 @@
+"""Video files in and out: mp4, gif, webm, mov; folders of pictures; numpy arrays."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from PIL import Image, ImageOps
+
+from bootifol.errors import BootifolError
+from bootifol.files import written_aside
+from bootifol.types import Frame, Frames
+
+VIDEO_SUFFIXES = (".mp4", ".mov", ".m4v", ".webm", ".mkv", ".avi", ".gif")
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+# People look at these videos: enlarge small pictures to at least this many pixels.
+_SMALLEST_SHOWN = 256
+
+
+@dataclass(frozen=True)
+class TimedFrame:
+    """One picture of a video and when it appears."""
+
+    frame: Frame
+    """uint8 `[H, W, 3]` RGB, upright."""
+
+    seconds: float | None
+    """After the first frame; None when the file does not know (folders of pictures, arrays)."""
+
+
+def stream_video(path: Path) -> Iterator[TimedFrame]:
+    """Decodes a video picture by picture, so that a long one fits in memory.
+
+    Args:
+        path: an mp4, mov, webm, gif … file; a folder of png or jpg pictures, taken in natural order of their
+            names (`frame2` before `frame10`); or a .npy file, uint8 `[frames, H, W, 3]`.
+
+    Raises:
+        BootifolError: the file is missing, empty, damaged, truncated or no video; at the latest at its end.
+    """
+    if path.is_dir():
+        yield from _stream_folder(path)
+    elif not path.exists():
+        raise BootifolError(f"{path} does not exist: give video files, folders of pictures or .npy arrays")
+    elif path.stat().st_size == 0:
+        raise BootifolError(f"{path} is empty (0 bytes): copy or export it again")
+    elif path.suffix.lower() == ".npy":
+        yield from _stream_array(path)
+    elif path.suffix.lower() in VIDEO_SUFFIXES:
+        yield from _stream_file(path)
+    else:
+        raise BootifolError(
+            f"{path} is not a video bootifol reads: give {', '.join(VIDEO_SUFFIXES)} or .npy files, "
+            "or folders of png or jpg pictures"
+        )
+
+
+def read_video(path: Path) -> Frames:
+    """All pictures of a video, uint8 `[frames, H, W, 3]`; errors as `stream_video`."""
+    return np.stack([timed.frame for timed in stream_video(path)])
+
+
+def frame_rate(path: Path) -> float | None:
+    """Frames per second as a video file declares it; None for folders, arrays and files that do not."""
+    if path.is_dir() or path.suffix.lower() not in VIDEO_SUFFIXES:
+        return None
+    with _opened(path) as container:
+        rate = container.streams.video[0].average_rate
+        return float(rate) if rate else None
+
+
+def write_video(path: Path, frames: Frames, frames_per_second: float) -> None:
+    """Writes an mp4 that every browser plays (H.264, yuv420p, index first), whole or not at all.
+
+    Small pictures are enlarged by a whole factor with hard edges, so that each pixel stays a square; the
+    factor also makes both sides even, as H.264 wants them.
+
+    Args:
+        path: the .mp4 file.
+        frames: uint8 `[frames, H, W, 3]` RGB, at least one.
+        frames_per_second: playing speed.
+
+    Raises:
+        BootifolError: there are no frames, or the disk is full.
+    """
+    if frames.ndim != 4 or frames.shape[-1] != 3 or frames.size == 0 or frames.dtype != np.uint8:
+        raise BootifolError(f"{path}: a video needs uint8 frames [n, H, W, 3], not {list(frames.shape)}")
+    if not frames_per_second > 0:
+        raise BootifolError(f"{path}: frames per second must be positive, not {frames_per_second}")
+    height, width = frames.shape[1:3]
+    factor = math.ceil(_SMALLEST_SHOWN / max(height, width))
+    if factor % 2 and (height % 2 or width % 2):
+        factor += 1
+    with (
+        written_aside(path) as aside,
+        av.open(str(aside), "w", format="mp4", options={"movflags": "+faststart"}) as container,
+    ):
+        rate = Fraction(frames_per_second).limit_denominator(1001)
+        stream = container.add_stream("libx264", rate=rate, options={"crf": "18", "preset": "fast"})
+        stream.width, stream.height, stream.pix_fmt = width * factor, height * factor, "yuv420p"
+        stream.thread_count = 1  # the same bytes on every machine
+        for frame in frames:
+            enlarged = np.ascontiguousarray(frame.repeat(factor, axis=0).repeat(factor, axis=1))
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(enlarged, format="rgb24")))
+        container.mux(stream.encode(None))
+
+
+def _stream_folder(path: Path) -> Iterator[TimedFrame]:
+    pictures = sorted(
+        (file for file in path.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES), key=_natural_order
+    )
+    if not pictures:
+        raise BootifolError(f"{path} holds no pictures: a folder should hold one video as png or jpg files")
+    size: tuple[int, int] | None = None
+    for file in pictures:
+        try:
+            with Image.open(file) as picture:
+                frame = np.asarray(ImageOps.exif_transpose(picture).convert("RGB"))
+        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+            raise BootifolError(f"{file} is damaged or no picture: {error}") from error
+        if size is not None and frame.shape[:2] != size:
+            raise BootifolError(
+                f"{file} is {frame.shape[1]}×{frame.shape[0]} pixels and the pictures before it are "
+                f"{size[1]}×{size[0]}: one folder should hold one video"
+            )
+        size = frame.shape[:2]
+        yield TimedFrame(frame, None)
+
+
+def _natural_order(path: Path) -> list[tuple[int, str]]:
+    return [
+        (int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name.lower())
+    ]
+
+
+def _stream_array(path: Path) -> Iterator[TimedFrame]:
+    try:
+        frames = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, OSError, EOFError) as error:
+        raise BootifolError(f"{path} is damaged or no numpy array: {error}") from error
+    if frames.dtype != np.uint8 or frames.ndim != 4 or frames.shape[-1] != 3 or frames.size == 0:
+        raise BootifolError(
+            f"{path} holds {frames.dtype} {list(frames.shape)}: a video is uint8 [frames, height, width, 3]"
+        )
+    for frame in frames:
+        yield TimedFrame(np.array(frame), None)
+
+
+def _stream_file(path: Path) -> Iterator[TimedFrame]:
+    count = 0
+    first = end = 0.0
+    with _opened(path) as container:
+        stream = container.streams.video[0]
+        promised = _promised_frames(stream)
+        try:
+            for frame in container.decode(stream):
+                if frame.is_corrupt:
+                    raise _truncated(path, count, promised, "a picture is corrupt")
+                seconds = frame.time if frame.time is not None else end
+                if count == 0:
+                    first = seconds
+                lasts = frame.duration * frame.time_base if frame.duration and frame.time_base else 0
+                end = seconds + float(lasts)
+                count += 1
+                yield TimedFrame(_upright(frame), seconds - first)
+        except av.FFmpegError as error:
+            raise _truncated(path, count, promised, str(error.strerror)) from error
+        promised_seconds = _promised_seconds(container)
+    if count == 0:
+        raise BootifolError(f"{path} holds no pictures: copy or export it again")
+    if count < promised:
+        raise _truncated(path, count, promised, "it ends too early")
+    # Where frames are not counted the length may still be known; the last frame's own duration may not be.
+    if not promised and promised_seconds is not None and end + 1.5 * end / count < promised_seconds:
+        raise BootifolError(
+            f"{path} is truncated: its pictures end after {end:.2f} s of {promised_seconds:.2f} s; "
+            "copy or export it again"
+        )
+    if path.suffix.lower() == ".gif" and not path.read_bytes().rstrip(b"\0").endswith(b";"):
+        raise BootifolError(
+            f"{path} is truncated: the mark at a gif's end is missing; copy or export it again"
+        )
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[av.container.InputContainer]:
+    try:
+        container = av.open(str(path))
+    except (av.FFmpegError, ValueError) as error:
+        raise BootifolError(
+            f"{path} is damaged, truncated or no video ({error}): copy or export it again"
+        ) from error
+    with container:
+        if not container.streams.video:
+            raise BootifolError(f"{path} holds sound but no pictures: give a video file")
+        yield container
+
+
+def _promised_frames(stream: av.VideoStream) -> int:
+    """The number of frames the file says it has; 0 when it does not say."""
+    counted = int(stream.frames)
+    if not counted or stream.duration is None or not stream.average_rate or not stream.time_base:
+        return counted
+    # A video trimmed by an edit list still counts the frames before the cut, and plays shorter.
+    played = float(stream.duration * stream.time_base * stream.average_rate)
+    return counted if played > counted - 0.5 else math.floor(played) - 1
+
+
+def _promised_seconds(container: av.container.InputContainer) -> float | None:
+    """How long the pictures should last; None when the file does not say, or when sound may last longer."""
+    if container.duration is None or len(container.streams) > 1:
+        return None
+    return float(container.duration / av.time_base)
+
+
+def _upright(frame: av.VideoFrame) -> Frame:
+    """The picture as people see it: phones store portrait videos lying down, with a note how to turn them."""
+    pixels = frame.to_ndarray(format="rgb24")
+    return np.ascontiguousarray(np.rot90(pixels, k=round(frame.rotation / 90)))
+
+
+def _truncated(path: Path, count: int, promised: int, why: str) -> BootifolError:
+    of = f" of {promised}" if promised else ""
+    return BootifolError(
+        f"{path} is damaged or truncated: {count}{of} pictures could be read ({why}); copy or export it again"
+    )
