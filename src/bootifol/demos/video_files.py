@@ -200,7 +200,7 @@ def _opened(path: Path) -> Iterator[av.container.InputContainer]:
         ) from error
     with container:
         if not container.streams.video:
-            raise BootifolError(f"{path} holds sound but no pictures: give a video file")
+            raise BootifolError(f"{path} holds no pictures (truncated, or sound only): give a whole video")
         yield container
 
 
