@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from bootifol.envs.drawn import SPEED
 from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
 from bootifol.experts import reacher
@@ -79,10 +80,9 @@ def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Contr
     if task_name == "drawn_reach":
 
         def move(goal: NDArray[np.float64] | None) -> Action:
-            from bootifol.envs.drawn import SPEED
-
             away = (simulator.target if goal is None else goal) - simulator.dot
-            return np.clip(away / SPEED, -1.0, 1.0).astype(np.float32)
+            action: Action = np.clip(away / SPEED, -1.0, 1.0).astype(np.float32)
+            return action
 
         def wrong_spot(rng: np.random.Generator) -> NDArray[np.float64]:
             spot = rng.uniform(-0.9, 0.9, 2)

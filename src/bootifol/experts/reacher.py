@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bootifol.types import Action
+
 LINK = 0.12
 """Length of each of the arm's two links, in meters."""
 
@@ -14,13 +16,14 @@ STIFFNESS, DAMPING = 4.0, 0.5
 """Torque (in units of its limit) per radian of error, and per radian a second."""
 
 
-def torques(physics: Any, goal: NDArray[np.float64]) -> NDArray[np.float32]:
+def torques(physics: Any, goal: NDArray[np.float64]) -> Action:
     """The action `[2]` that brings the fingertip to `goal` `[2]`, a point in meters."""
     angles = physics.data.qpos[:2]
     velocities = physics.data.qvel[:2]
     error = _nearest_angles(goal, angles) - angles
     error[0] = _wrapped(error[0])
-    return np.clip(STIFFNESS * error - DAMPING * velocities, -1.0, 1.0).astype(np.float32)
+    action: Action = np.clip(STIFFNESS * error - DAMPING * velocities, -1.0, 1.0).astype(np.float32)
+    return action
 
 
 def target_position(physics: Any) -> NDArray[np.float64]:

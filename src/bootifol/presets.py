@@ -1,0 +1,78 @@
+"""Presets: whole configurations, in plain Python. The command line overrides single fields of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from bootifol.agents.drqv2 import DrQv2Config
+from bootifol.envs.pictures import PictureConfig
+from bootifol.errors import BootifolError
+from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.registry import RewardConfig
+from bootifol.training.config import (
+    AlignmentConfig,
+    EvaluationConfig,
+    InteractiveConfig,
+    TrainingConfig,
+)
+
+PresetName = Literal["paper", "cpu", "smoke"]
+
+PAPER = TrainingConfig()
+"""The paper's hyperparameters to the digit: they are the defaults of every field."""
+
+CPU = TrainingConfig(
+    pictures=PictureConfig(agent_size=64, video_size=64),
+    reward=RewardConfig(
+        BootifolConfig(width_divisor=4, frames_per_video=16, precision="bf16", reward_scale="alignment")
+    ),
+    agent=DrQv2Config(
+        encoder="coarse",
+        hidden_dim=512,
+        batch_size=128,
+        exploration_steps=100_000,
+        replay_capacity=100_000,
+    ),
+    alignment=AlignmentConfig(gradient_steps=1500),
+    interactive=InteractiveConfig(
+        agent_steps=500_000,
+        reward_updates_until=250_000,
+        agent_videos=1500,
+    ),
+    evaluation=EvaluationConfig(every=20_000, final_episodes=50),
+)
+"""The same algorithm with smaller networks, pictures and counts: a run ends within 3 hours on 2 cores and 8 GB."""
+
+SMOKE = replace(
+    CPU,
+    reward=RewardConfig(replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4)),
+    agent=replace(
+        CPU.agent,
+        hidden_dim=64,
+        batch_size=32,
+        warm_up_steps=240,
+        exploration_steps=1000,
+        replay_capacity=3000,
+    ),
+    alignment=AlignmentConfig(gradient_steps=60, log_every=5),
+    interactive=InteractiveConfig(agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150),
+    evaluation=EvaluationConfig(
+        every=450, episodes=1, long_episodes=1, final_episodes=2, held_out_videos=6, showcase_episodes=2
+    ),
+)
+"""Every stage in under two minutes. It learns nothing worth having."""
+
+PRESETS: dict[PresetName, TrainingConfig] = {"paper": PAPER, "cpu": CPU, "smoke": SMOKE}
+
+
+def preset(name: str) -> TrainingConfig:
+    """Looks a preset up.
+
+    Raises:
+        BootifolError: there is none of that name.
+    """
+    for known, config in PRESETS.items():
+        if known == name:
+            return config
+    raise BootifolError(f"there is no preset '{name}'; the presets are {', '.join(PRESETS)}")

@@ -1,0 +1,35 @@
+"""Alignment Phase: the first loop of Algorithm 1."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from bootifol.rewards.base import RewardModel
+from bootifol.training.budget import Budget, Counters, Stopwatch
+from bootifol.types import Metrics, VideoSource
+
+
+def alignment_phase(
+    reward_model: RewardModel, expert: VideoSource, random: VideoSource, budget: Budget, counters: Counters
+) -> Iterator[Metrics]:
+    """Takes gradient steps on expert and random videos until N_pretrain, or the phase's share of the time.
+
+    Args:
+        reward_model: any method.
+        expert: D_e.
+        random: videos of a policy that acts at random.
+        budget: how long the phase may last.
+        counters: `alignment_steps` and `alignment_seconds` are kept up to date.
+
+    Yields:
+        The metrics of each gradient step. A method that has nothing to align yields none.
+    """
+    watch = Stopwatch()
+    steps = reward_model.align(expert, random)
+    while not budget.alignment_ended(counters):
+        metrics = next(steps, None)
+        if metrics is None:
+            return
+        counters.alignment_steps += 1
+        counters.alignment_seconds += watch.lap()
+        yield metrics

@@ -1,0 +1,93 @@
+"""How far a run is, and how far it may go: in agent steps, or in wall-clock time."""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import asdict, dataclass
+
+from bootifol.errors import BootifolError
+
+
+@dataclass
+class Counters:
+    """What has been done so far, over all sessions of a run."""
+
+    alignment_steps: int = 0
+    agent_steps: int = 0
+    episodes: int = 0
+    agent_updates: int = 0
+    reward_updates: int = 0
+    evaluations: int = 0
+    alignment_seconds: float = 0.0
+    """Wall-clock time spent in the Alignment Phase."""
+    interactive_seconds: float = 0.0
+    """Wall-clock time spent in the Interactive Phase, evaluations included."""
+
+    def as_json(self) -> dict[str, float]:
+        return asdict(self)
+
+    @property
+    def seconds(self) -> float:
+        return self.alignment_seconds + self.interactive_seconds
+
+
+class Stopwatch:
+    """Adds the wall-clock time since the last `lap` to a counter."""
+
+    def __init__(self) -> None:
+        self._since = time.monotonic()
+
+    def lap(self) -> float:
+        now = time.monotonic()
+        elapsed, self._since = now - self._since, now
+        return elapsed
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a run may spend.
+
+    Without a time limit, schedules follow agent steps and a run is reproducible bit for bit. With one, they are
+    stretched over the time there is: a quarter of the way into the time, the noise stands where it would stand
+    a quarter of the way into `agent_steps`.
+    """
+
+    agent_steps: int
+    """N_π: the agent steps that schedules are written for."""
+
+    seconds: float | None = None
+    """Wall-clock time for the whole run, or None."""
+
+    alignment_steps: int = 0
+    """N_pretrain."""
+
+    alignment_share: float = 0.0
+    """Largest share of `seconds` for the Alignment Phase."""
+
+    def alignment_ended(self, counters: Counters) -> bool:
+        if counters.alignment_steps >= self.alignment_steps:
+            return True
+        return self.seconds is not None and counters.alignment_seconds >= self.alignment_share * self.seconds
+
+    def scheduled_steps(self, counters: Counters) -> int:
+        """Where schedules stand, in agent steps from 0 to N_π."""
+        if self.seconds is None:
+            return counters.agent_steps
+        available = max(self.seconds - counters.alignment_seconds, 1e-9)
+        return min(int(self.agent_steps * counters.interactive_seconds / available), self.agent_steps)
+
+    def ended(self, counters: Counters) -> bool:
+        return self.scheduled_steps(counters) >= self.agent_steps
+
+
+def parse_duration(text: str) -> float:
+    """Seconds in a duration such as "90s", "45m", "1.5h" or "1h30m".
+
+    Raises:
+        BootifolError: it is none of these.
+    """
+    units = {"s": 1, "m": 60, "h": 3600}
+    if not re.fullmatch(r"(\d+(\.\d+)?[smh])+", text):
+        raise BootifolError(f"'{text}' is not a duration; write it like 90s, 45m, 1.5h or 1h30m")
+    return sum(float(number) * units[unit] for number, _, unit in re.findall(r"(\d+(\.\d+)?)([smh])", text))

@@ -1,0 +1,120 @@
+"""Checkpoints: everything a run is, in safetensors and JSON, whole or absent.
+
+```
+checkpoints/
+  000000000000-000000400/    agent steps and alignment steps, so names sort by age
+    checkpoint.json          counters, random state, how long metrics.jsonl was
+    reward_model.safetensors    networks, optimizer, statistics, random state
+    agent.safetensors
+    replay.safetensors
+    agent_videos.safetensors
+```
+
+A new checkpoint is complete under its own name before older ones are removed, so a full disk or a lost
+process leaves the last good one.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from bootifol.errors import BootifolError
+from bootifol.files import read_arrays, read_json, write_arrays, write_json, written_aside
+from bootifol.training.budget import Counters
+from bootifol.types import Arrays
+
+FORMAT = 1
+
+
+class Stateful(Protocol):
+    """A component that can be written to a checkpoint and read back exactly."""
+
+    def state(self) -> Arrays: ...
+
+    def load_state(self, arrays: Arrays) -> None: ...
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run stood: the part of a checkpoint that is not arrays."""
+
+    counters: Counters
+    random_state: dict[str, Any]
+    """Of the run's `np.random.Generator`."""
+    metrics_bytes: int
+    """Length of `metrics.jsonl`; what was appended later is undone on resuming."""
+
+
+def save_checkpoint(directory: Path, progress: Progress, components: Mapping[str, Stateful]) -> Path:
+    """Writes a checkpoint under `directory`, then removes older ones.
+
+    Raises:
+        BootifolError: it could not be written; earlier checkpoints are intact.
+    """
+    counters = progress.counters
+    target = directory / f"{counters.agent_steps:012d}-{counters.alignment_steps:09d}"
+    with written_aside(target) as aside:
+        aside.mkdir()
+        for name, component in components.items():
+            write_arrays(aside / f"{name}.safetensors", component.state())
+        write_json(
+            aside / "checkpoint.json",
+            {
+                "format": FORMAT,
+                "counters": counters.as_json(),
+                "random_state": progress.random_state,
+                "metrics_bytes": progress.metrics_bytes,
+            },
+        )
+    for older in _checkpoints(directory):
+        if older != target:
+            shutil.rmtree(older)
+    return target
+
+
+def newest_checkpoint(directory: Path) -> Path | None:
+    """The newest complete checkpoint under `directory`, or None."""
+    found = _checkpoints(directory)
+    return found[-1] if found else None
+
+
+def load_checkpoint(checkpoint: Path, components: Mapping[str, Stateful]) -> Progress:
+    """Restores components from a checkpoint; those not named are left in the file.
+
+    Raises:
+        BootifolError: a file is missing, truncated or does not fit the configuration.
+    """
+    meta = read_json(checkpoint / "checkpoint.json", "the checkpoint's index")
+    if meta.get("format") != FORMAT:
+        raise BootifolError(
+            f"{checkpoint} was written in checkpoint format {meta.get('format')}, this version reads {FORMAT}; "
+            "resume it with the version named in the run's config.json"
+        )
+    for name, component in components.items():
+        arrays = read_arrays(checkpoint / f"{name}.safetensors", f"the checkpoint's {name}")
+        try:
+            component.load_state(arrays)
+        except (KeyError, ValueError, RuntimeError) as error:
+            raise BootifolError(
+                f"the checkpoint's {name} does not fit this run's configuration: {checkpoint}: {error}"
+            ) from error
+    return Progress(Counters(**meta["counters"]), meta["random_state"], meta["metrics_bytes"])
+
+
+def restore_generator(random_state: dict[str, Any]) -> np.random.Generator:
+    """A generator that continues where the saved one stood."""
+    generator = np.random.default_rng()
+    generator.bit_generator.state = random_state
+    return generator
+
+
+def _checkpoints(directory: Path) -> list[Path]:
+    if not directory.is_dir():
+        return []
+    return sorted(path for path in directory.iterdir() if path.is_dir() and not path.name.startswith("."))

@@ -1,0 +1,171 @@
+"""Builds what a run is made of, in one visible place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from rich.console import Console
+
+from bootifol.agents.drqv2 import DrQv2
+from bootifol.demos.agent_videos import AgentVideos
+from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.record import record
+from bootifol.errors import BootifolError
+from bootifol.evaluation.ranking import KINDS
+from bootifol.replay.buffer import ReplayBuffer
+from bootifol.rewards.base import RewardModel
+from bootifol.rewards.registry import make_reward_model
+from bootifol.tasks import make_environment, task_named
+from bootifol.training.checkpoint import Stateful
+from bootifol.training.run_config import RunConfig
+from bootifol.types import Video, VideoSource
+
+_VERIFY_BELOW_BYTES = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class Demos:
+    """The videos of a run."""
+
+    expert: VideoSource
+    """D_e: the expert videos that the reward learns from and agents are compared with."""
+    random: VideoSource
+    """Videos of a random policy, the other class of the Alignment Phase."""
+    held_out: dict[str, list[Video]]
+    """Videos by kind that the reward never learns from, to see whether it ranks them right."""
+
+
+@dataclass(frozen=True)
+class Components:
+    """The parts of a run that learn or remember."""
+
+    reward_model: RewardModel
+    agent: DrQv2
+    replay: ReplayBuffer
+    agent_videos: AgentVideos
+
+    def stateful(self) -> dict[str, Stateful]:
+        """By the names of their files in a checkpoint."""
+        return {
+            "reward_model": self.reward_model,
+            "agent": self.agent,
+            "replay": self.replay,
+            "agent_videos": self.agent_videos,
+        }
+
+
+def build_environment(run: RunConfig, episode_steps: int) -> gymnasium.Env[Any, Any]:
+    """An environment of the run's task that shows it as the run's configuration says."""
+    return make_environment(run.task, run.training.pictures, episode_steps)
+
+
+def build_reward_model(run: RunConfig) -> RewardModel:
+    """The method's reward model, untrained."""
+    return make_reward_model(run.method, run.training.reward, run.training.pictures.video_size, run.seed)
+
+
+def build_agent(run: RunConfig, environment: gymnasium.Env[Any, Any]) -> DrQv2:
+    """The agent, untrained."""
+    assert isinstance(environment.action_space, gymnasium.spaces.Box)
+    pictures = run.training.pictures
+    return DrQv2(
+        run.training.agent,
+        pictures.agent_size,
+        pictures.stack,
+        environment.action_space.shape[0],
+        run.seed,
+    )
+
+
+def build_components(run: RunConfig, environment: gymnasium.Env[Any, Any], console: Console) -> Components:
+    """Everything that learns or remembers; says how much memory it will take before it takes it."""
+    config, pictures = run.training, run.training.pictures
+    assert isinstance(environment.action_space, gymnasium.spaces.Box)
+    action_dim = environment.action_space.shape[0]
+    frames = task_named(run.task).episode_steps + 1
+    replay_bytes = ReplayBuffer.bytes_needed(config.agent.replay_capacity, pictures.agent_size, action_dim)
+    video_bytes = AgentVideos.bytes_needed(config.interactive.agent_videos, frames, pictures.video_size)
+    console.print(
+        f"memory when full: replay {replay_bytes / 1e9:.2f} GB ({config.agent.replay_capacity:,} frames), "
+        f"the agent's videos {video_bytes / 1e9:.2f} GB ({config.interactive.agent_videos:,} episodes)"
+    )
+    return Components(
+        reward_model=build_reward_model(run),
+        agent=build_agent(run, environment),
+        replay=ReplayBuffer(
+            config.agent.replay_capacity,
+            pictures.agent_size,
+            action_dim,
+            pictures.stack,
+            config.agent.n_step,
+            config.agent.discount,
+            config.agent.shift,
+        ),
+        agent_videos=AgentVideos(config.interactive.agent_videos, frames, pictures.video_size),
+    )
+
+
+def open_demos(run: RunConfig, console: Console) -> Demos:
+    """Opens the demo sets of a run; records the random videos where there are none.
+
+    Raises:
+        BootifolError: there are no expert videos, or they do not match the task and the configuration.
+    """
+    root = Path(run.demos)
+    paths = find_demo_sets(root)
+    if "expert" not in paths:
+        raise BootifolError(
+            f"there are no expert videos in {root}: record them with "
+            f"`bootifol demos record --task {run.task} --out {root}` or import your own with `bootifol demos import`"
+        )
+    expert = _open(paths["expert"], run)
+    if "random" not in paths:
+        console.print("no random videos beside the expert's; recording as many")
+        record(
+            run.task,
+            "random",
+            len(expert),
+            root / "random",
+            run.training.pictures,
+            seed=run.seed,
+            episode_steps=expert.manifest.frames - 1,
+        )
+        paths = find_demo_sets(root)
+    held_out = min(run.training.evaluation.held_out_videos, len(expert) // 5)
+    sources: dict[str, VideoSource] = {}
+    kept: dict[str, list[Video]] = {}
+    for kind in KINDS:
+        if kind not in paths:
+            continue
+        demo_set = expert if kind == "expert" else _open(paths[kind], run)
+        training, aside = demo_set.split(min(held_out, len(demo_set) - 1))
+        sources[kind] = training
+        kept[kind] = [aside[index] for index in range(len(aside))]
+    return Demos(sources["expert"], sources["random"], kept if held_out else {})
+
+
+def reference_rng(seed: int, agent_steps: int) -> np.random.Generator:
+    """The generator that draws references for measurements, apart from the one that learning draws from."""
+    return np.random.default_rng([seed, 2, agent_steps])
+
+
+def _open(path: Path, run: RunConfig) -> DemoSet:
+    manifest_bytes = sum(file.stat().st_size for file in path.glob("*.npy"))
+    demo_set = DemoSet.open(path, verify=manifest_bytes < _VERIFY_BELOW_BYTES)
+    manifest, pictures = demo_set.manifest, run.training.pictures
+    episode_steps = task_named(run.task).episode_steps
+    if manifest.video_size != pictures.video_size:
+        raise BootifolError(
+            f"the videos in {path} are {manifest.video_size} pixels and this run reads {pictures.video_size}: "
+            f"pass --pictures.video-size {manifest.video_size}, or make the videos again at {pictures.video_size}"
+        )
+    if manifest.frames < episode_steps + 1:
+        raise BootifolError(
+            f"the videos in {path} have {manifest.frames} frames, but an episode of {run.task} has "
+            f"{episode_steps + 1}: make longer videos"
+        )
+    return demo_set

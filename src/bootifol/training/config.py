@@ -1,0 +1,124 @@
+"""Everything a run can be told, as frozen dataclasses; a field's docstring is its help text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from bootifol.agents.drqv2 import DrQv2Config
+from bootifol.envs.pictures import PictureConfig
+from bootifol.errors import BootifolError
+from bootifol.rewards.registry import RewardConfig
+
+
+def _at_least(minimum: float, **fields: float) -> None:
+    for name, value in fields.items():
+        if value < minimum:
+            raise BootifolError(f"{name} must be at least {minimum}, not {value}")
+
+
+@dataclass(frozen=True)
+class AlignmentConfig:
+    """Alignment Phase: the reward learns to tell expert from random videos before the agent acts."""
+
+    gradient_steps: int = 8000
+    """N_pretrain of Algorithm 1."""
+
+    time_share: float = 0.15
+    """With a time budget, the largest share of it that this phase may take."""
+
+    log_every: int = 20
+    """Gradient steps a line of metrics averages over."""
+
+    def __post_init__(self) -> None:
+        _at_least(0, gradient_steps=self.gradient_steps, time_share=self.time_share)
+        _at_least(1, log_every=self.log_every)
+
+
+@dataclass(frozen=True)
+class InteractiveConfig:
+    """Interactive Phase: the agent acts and learns, and its episodes bootstrap the reward."""
+
+    agent_steps: int = 1_550_000
+    """N_π: agent steps in all (one agent step is `action_repeat` environment frames)."""
+
+    reward_update_every: int = 50
+    """N_update: agent steps between two gradient steps of the reward."""
+
+    reward_updates_until: int = 375_000
+    """N_train: agent steps after which the reward is frozen."""
+
+    agent_videos: int = 5000
+    """Capacity of D_a: how many of the agent's newest episodes the reward learns from."""
+
+    relabel_episodes: int = 0
+    """Stored episodes rewarded anew after each update of the reward, drawn at random among those still
+    in replay; 0 as in the paper, whose stored rewards go stale."""
+
+    log_every: int = 1000
+    """Agent steps a line of metrics averages over."""
+
+    def __post_init__(self) -> None:
+        _at_least(
+            0,
+            agent_steps=self.agent_steps,
+            reward_updates_until=self.reward_updates_until,
+            relabel_episodes=self.relabel_episodes,
+        )
+        _at_least(
+            1,
+            reward_update_every=self.reward_update_every,
+            agent_videos=self.agent_videos,
+            log_every=self.log_every,
+        )
+
+
+@dataclass(frozen=True)
+class EvaluationConfig:
+    """When and how the policy is measured. Nothing measured here reaches a learner."""
+
+    every: int = 25_000
+    """Agent steps between two evaluations during training."""
+
+    episodes: int = 5
+    """Episodes each time, of the task's training length (60 agent steps), as the paper's curves."""
+
+    long_episodes: int = 2
+    """Episodes each time of the task's evaluation length (500 agent steps), as the paper's tables."""
+
+    final_episodes: int = 50
+    """Episodes of the evaluation length when training has ended."""
+
+    held_out_videos: int = 32
+    """Expert videos that the reward never learns from, kept to see whether it ranks them right."""
+
+    showcase_episodes: int = 3
+    """Starts from which expert, agent and random play for the report's videos and film strips."""
+
+    def __post_init__(self) -> None:
+        _at_least(1, every=self.every, final_episodes=self.final_episodes)
+        _at_least(0, episodes=self.episodes, long_episodes=self.long_episodes)
+        _at_least(0, held_out_videos=self.held_out_videos, showcase_episodes=self.showcase_episodes)
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """All of a run's configuration."""
+
+    pictures: PictureConfig = field(default_factory=PictureConfig)
+    reward: RewardConfig = field(default_factory=RewardConfig)
+    agent: DrQv2Config = field(default_factory=DrQv2Config)
+    alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
+    interactive: InteractiveConfig = field(default_factory=InteractiveConfig)
+    evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+
+    threads: int = 2
+    """Threads PyTorch computes with."""
+
+    checkpoint_minutes: float = 20.0
+    """Minutes between two checkpoints; one is also written at the end and when the run is interrupted."""
+
+    tensorboard: bool = True
+    """Also write TensorBoard event files."""
+
+    def __post_init__(self) -> None:
+        _at_least(1, threads=self.threads)

@@ -1,0 +1,116 @@
+"""Interactive Phase: the second loop of Algorithm 1.
+
+The agent acts; its episodes are rewarded by the learned reward and enter replay; and, as the "other" videos that
+the reward learns to tell from the expert's, they bootstrap that reward.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from bootifol.agents.drqv2 import DrQv2
+from bootifol.demos.agent_videos import AgentVideos
+from bootifol.envs.rollout import EpisodeRecorder, rollout
+from bootifol.evaluation.ranking import draw_references
+from bootifol.replay.buffer import ReplayBuffer
+from bootifol.rewards.base import RewardModel
+from bootifol.tracking import Averages
+from bootifol.training.budget import Budget, Counters, Stopwatch
+from bootifol.training.config import InteractiveConfig
+from bootifol.types import Action, Observation, VideoSource
+
+
+@dataclass
+class InteractivePhase:
+    """Everything the second loop of Algorithm 1 touches."""
+
+    environment: gymnasium.Env[Any, Any]
+    expert: VideoSource
+    """D_e."""
+    agent_videos: AgentVideos
+    """D_a."""
+    replay: ReplayBuffer
+    """D."""
+    reward_model: RewardModel
+    """f, g, q, d."""
+    agent: DrQv2
+    """π, Q."""
+    config: InteractiveConfig
+    budget: Budget
+    counters: Counters
+    seed: int
+    rng: np.random.Generator
+    """Draws reference videos and replay batches."""
+
+    def __post_init__(self) -> None:
+        self.averages = Averages()
+        self._watch = Stopwatch()
+
+    def play_episode(self) -> None:
+        """One turn of the outer loop: act and learn for an episode, then reward it and store it."""
+        references = draw_references(self.reward_model, self.expert, self.rng)
+        name = f"agent-{self.counters.episodes:07d}"
+        recorder = EpisodeRecorder(name, self.reward_model.reads_environment_reward)
+        for step in rollout(self.environment, self._act, episode_seed(self.seed, self.counters.episodes)):
+            recorder.add(step)
+            self.counters.agent_steps += 1
+            self._update_agent()
+            self._update_reward()
+        episode = recorder.episode()
+        rewards = self.reward_model.label(episode.video, references)
+        self.replay.add(episode, rewards)
+        self.agent_videos.add(episode.video)
+        self.counters.episodes += 1
+        self.counters.interactive_seconds += self._watch.lap()
+        self.averages.add({"episode/learned_reward": float(rewards.mean())})
+
+    @property
+    def _warming_up(self) -> bool:
+        return self.counters.agent_steps < self.agent.config.warm_up_steps or len(self.replay) == 0
+
+    def _act(self, observation: Observation) -> Action:
+        if self._warming_up:
+            shape = self.environment.action_space.shape
+            return self.rng.uniform(-1.0, 1.0, shape).astype(np.float32)
+        return self.agent.act(observation, self.budget.scheduled_steps(self.counters), explore=True)
+
+    def _update_agent(self) -> None:
+        if self._warming_up or self.counters.agent_steps % self.agent.config.update_every:
+            return
+        batch = self.replay.sample(self.agent.config.batch_size, self.rng)
+        self.averages.add(self.agent.update(batch, self.budget.scheduled_steps(self.counters)))
+        self.counters.agent_updates += 1
+
+    def _update_reward(self) -> None:
+        if self._warming_up or self.counters.agent_steps % self.config.reward_update_every:
+            return
+        if self.budget.scheduled_steps(self.counters) > self.config.reward_updates_until:
+            return
+        self.averages.add(self.reward_model.update(self.expert, self.agent_videos))
+        self.counters.reward_updates += 1
+        for _ in range(self.config.relabel_episodes):
+            self._relabel_one()
+
+    def _relabel_one(self) -> None:
+        """Rewards a stored episode anew, so that replay follows the reward as it learns."""
+        ids = self.replay.episode_ids
+        kept = range(max(ids.start, ids.stop - len(self.agent_videos)), ids.stop)
+        episode_id = int(self.rng.integers(kept.start, kept.stop))
+        video = self.agent_videos[episode_id % self.config.agent_videos]
+        references = draw_references(self.reward_model, self.expert, self.rng)
+        self.replay.relabel(episode_id, self.reward_model.label(video, references))
+
+
+def episode_seed(run_seed: int, episode: int) -> int:
+    """The seed of an episode's start, a function of the run's seed and the episode's number alone, so that a
+    resumed run meets the same starts."""
+    return int(np.random.SeedSequence([run_seed, 0, episode]).generate_state(1)[0])
+
+
+def evaluation_seeds(run_seed: int, count: int) -> list[int]:
+    """Seeds of evaluation starts, which training never meets."""
+    return [int(np.random.SeedSequence([run_seed, 1, index]).generate_state(1)[0]) for index in range(count)]

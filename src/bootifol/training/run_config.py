@@ -1,0 +1,112 @@
+"""`config.json`: what a run is, in a form that rebuilds it."""
+
+from __future__ import annotations
+
+import dataclasses
+import platform
+import typing
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, TypeVar
+
+from bootifol.errors import BootifolError
+from bootifol.files import read_json, write_json
+from bootifol.training.config import TrainingConfig
+
+FORMAT = 1
+_PACKAGES = ("bootifol", "torch", "numpy", "mujoco", "dm-control", "gymnasium", "numba", "safetensors")
+_Config = TypeVar("_Config")
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """Everything that determines a run."""
+
+    task: str
+    method: str
+    preset: str
+    seed: int
+    demos: str
+    """Directory of the demo sets."""
+    time_budget: float | None
+    """Seconds of wall-clock time for learning, or None for the preset's agent steps."""
+    training: TrainingConfig
+
+    def write(self, directory: Path, command: list[str]) -> None:
+        """Writes `config.json`."""
+        write_json(
+            directory / "config.json",
+            {
+                "format": FORMAT,
+                "task": self.task,
+                "method": self.method,
+                "preset": self.preset,
+                "seed": self.seed,
+                "demos": self.demos,
+                "time_budget": self.time_budget,
+                "command": command,
+                "config": dataclasses.asdict(self.training),
+                "versions": versions(),
+            },
+        )
+
+    @classmethod
+    def read(cls, directory: Path) -> RunConfig:
+        """Reads `config.json`.
+
+        Raises:
+            BootifolError: it is missing, damaged, or of another format.
+        """
+        path = directory / "config.json"
+        if not path.is_file():
+            raise BootifolError(f"{directory} is not a run: there is no {path}")
+        data = read_json(path, "the run's configuration")
+        if not isinstance(data, dict) or data.get("format") != FORMAT:
+            raise BootifolError(
+                f"{path} is not a configuration in format {FORMAT}; was it written by bootifol?"
+            )
+        try:
+            return cls(
+                task=data["task"],
+                method=data["method"],
+                preset=data["preset"],
+                seed=data["seed"],
+                demos=data["demos"],
+                time_budget=data["time_budget"],
+                training=from_json(TrainingConfig, data["config"], str(path)),
+            )
+        except KeyError as error:
+            raise BootifolError(f"{path} lacks {error}; restore the file or start a new run") from error
+
+
+def from_json(kind: type[_Config], data: dict[str, Any], where: str) -> _Config:
+    """Rebuilds a nested frozen dataclass from what `dataclasses.asdict` and JSON made of it.
+
+    Raises:
+        BootifolError: a field is unknown to this version.
+    """
+    hints = typing.get_type_hints(kind)
+    unknown = sorted(set(data) - set(hints))
+    if unknown:
+        raise BootifolError(
+            f"{where} names {', '.join(unknown)}, which this version of bootifol does not know"
+        )
+    values: dict[str, Any] = {}
+    for name, value in data.items():
+        if dataclasses.is_dataclass(hints[name]):
+            values[name] = from_json(typing.cast(type, hints[name]), value, where)
+        else:
+            values[name] = tuple(value) if isinstance(value, list) else value
+    return kind(**values)
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that a run's numbers depend on."""
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found

@@ -1,0 +1,317 @@
+"""A run from its first step to its report: Alignment Phase, Interactive Phase, evaluation.
+
+What happens, in order, is `Run.learn` and `Run.finish`; what a phase does is in `alignment.py` and `interactive.py`.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from rich.console import Console
+
+from bootifol.envs.rollout import Act
+from bootifol.errors import BootifolError
+from bootifol.evaluation.ranking import KINDS, rank_videos, ranking_scores
+from bootifol.evaluation.returns import evaluate, evaluation_rows
+from bootifol.evaluation.showcase import play_showcase, write_showcase
+from bootifol.evaluation.summary import summarize
+from bootifol.evaluation.tables import append_evaluations, append_ranking
+from bootifol.experts import make_expert, make_random
+from bootifol.progress import progress
+from bootifol.tasks import task_named
+from bootifol.tracking import Averages, Tracker
+from bootifol.training.alignment import alignment_phase
+from bootifol.training.budget import Budget, Counters
+from bootifol.training.checkpoint import (
+    Progress,
+    load_checkpoint,
+    newest_checkpoint,
+    restore_generator,
+    save_checkpoint,
+)
+from bootifol.training.components import build_components, build_environment, open_demos, reference_rng
+from bootifol.training.interactive import InteractivePhase, evaluation_seeds
+from bootifol.training.interruption import Interruption
+from bootifol.training.run_config import RunConfig
+from bootifol.types import Action, Metrics, Observation, Video
+
+
+def start_run(run: RunConfig, directory: Path, command: list[str]) -> Path:
+    """Makes the directory of a new run.
+
+    Raises:
+        BootifolError: there is a run already.
+    """
+    if (directory / "config.json").exists():
+        raise BootifolError(
+            f"{directory} holds a run already: go on with `bootifol train --resume {directory}`, or choose "
+            "another --out"
+        )
+    run.write(directory, command)
+    return directory
+
+
+class Run:
+    """A run in progress; made from the directory of a new run or of one that was interrupted.
+
+    Args:
+        directory: holds `config.json`, and the newest checkpoint if the run was started before.
+        console: where messages go.
+
+    Raises:
+        BootifolError: the configuration, the demos or the checkpoint cannot be used.
+    """
+
+    def __init__(self, directory: Path, console: Console | None = None) -> None:
+        self.directory = directory
+        self.console = console or Console(stderr=True)
+        self.run = RunConfig.read(directory)
+        config = self.run.training
+        torch.set_num_threads(config.threads)
+        self.task = task_named(self.run.task)
+        self.demos = open_demos(self.run, self.console)
+        self.environment = build_environment(self.run, self.task.episode_steps)
+        self.components = build_components(self.run, self.environment, self.console)
+        self.counters = Counters()
+        self.rng = np.random.default_rng([self.run.seed, 3])
+        self._resume()
+        self.budget = Budget(
+            config.interactive.agent_steps,
+            self.run.time_budget,
+            config.alignment.gradient_steps,
+            config.alignment.time_share,
+        )
+        self.tracker = Tracker(directory, config.tensorboard)
+        self.interactive = InteractivePhase(
+            self.environment,
+            self.demos.expert,
+            self.components.agent_videos,
+            self.components.replay,
+            self.components.reward_model,
+            self.components.agent,
+            config.interactive,
+            self.budget,
+            self.counters,
+            self.run.seed,
+            self.rng,
+        )
+        self._saved_at = time.monotonic()
+        self._last_evaluation: dict[str, float] = {}
+
+    def learn(self) -> bool:
+        """Both phases.
+
+        Returns:
+            True when the run has ended; False when it was asked to stop and can be resumed.
+        """
+        with Interruption() as interruption:
+            try:
+                return self._align(interruption) and self._interact(interruption)
+            except BootifolError as error:
+                raise BootifolError(f"{error}. {self._how_to_resume()}") from error
+
+    def finish(self) -> Metrics:
+        """The measurements of a run that has ended: final returns, ranking, showcase.
+
+        Returns:
+            The final returns: mean, and the ends of its 95 % interval.
+        """
+        config = self.run.training.evaluation
+        scores = self._evaluate(self.task.evaluation_steps, config.final_episodes, "final evaluation")
+        self._rank()
+        self._showcase()
+        return scores
+
+    def _align(self, interruption: Interruption) -> bool:
+        config = self.run.training.alignment
+        if self.budget.alignment_ended(self.counters) or self.counters.agent_steps:
+            return True
+        averages = Averages()
+        model = self.components.reward_model
+        shown = {"loss": float("nan")}
+        with progress("aligning the reward", config.gradient_steps, self.counters.alignment_steps) as advance:
+            for metrics in alignment_phase(
+                model, self.demos.expert, self.demos.random, self.budget, self.counters
+            ):
+                averages.add(metrics)
+                if self.counters.alignment_steps % config.log_every == 0:
+                    means = averages.pop()
+                    shown["loss"] = means.get("loss/total", float("nan"))
+                    self._log("alignment", "gradient_step", self.counters.alignment_steps, means)
+                advance(1, **shown)
+                if interruption.requested:
+                    return self._stop()
+                self._checkpoint_if_due()
+        self._rank()
+        self._checkpoint()
+        return True
+
+    def _interact(self, interruption: Interruption) -> bool:
+        config = self.run.training
+        next_log = self.counters.agent_steps + config.interactive.log_every
+        with progress(
+            "agent steps", config.interactive.agent_steps, self.budget.scheduled_steps(self.counters)
+        ) as advance:
+            while not self.budget.ended(self.counters):
+                before = self.budget.scheduled_steps(self.counters)
+                self.interactive.play_episode()
+                if self.counters.agent_steps >= next_log:
+                    next_log += config.interactive.log_every
+                    self._log(
+                        "interactive",
+                        "agent_steps",
+                        self.counters.agent_steps,
+                        self.interactive.averages.pop(),
+                    )
+                if self.counters.agent_steps // config.evaluation.every > self.counters.evaluations:
+                    self.counters.evaluations = self.counters.agent_steps // config.evaluation.every
+                    self._evaluate_while_training()
+                advance(self.budget.scheduled_steps(self.counters) - before, **self._shown())
+                if interruption.requested:
+                    return self._stop()
+                self._checkpoint_if_due()
+        self._checkpoint()
+        return True
+
+    def _evaluate_while_training(self) -> None:
+        config = self.run.training.evaluation
+        if config.episodes:
+            self._evaluate(self.task.episode_steps, config.episodes)
+        if config.long_episodes:
+            self._evaluate(self.task.evaluation_steps, config.long_episodes)
+
+    def _evaluate(self, episode_steps: int, episodes: int, description: str | None = None) -> Metrics:
+        """Plays episodes without noise and appends them to `evaluations.csv`."""
+        agent, counters = self.components.agent, self.counters
+        environment = build_environment(self.run, episode_steps)
+        steps = self.budget.scheduled_steps(counters)
+
+        def act(observation: Observation) -> Action:
+            return agent.act(observation, steps, explore=False)
+
+        seeds = evaluation_seeds(self.run.seed, episodes)
+        if description is None:
+            results = evaluate(environment, act, seeds)
+        else:
+            results = []
+            with progress(description, episodes) as advance:
+                for seed in seeds:
+                    results += evaluate(environment, act, [seed])
+                    advance(1)
+        environment.close()
+        at_evaluation_length = episode_steps == self.task.evaluation_steps
+        rows = evaluation_rows(
+            results,
+            agent_steps=counters.agent_steps,
+            seconds=counters.seconds,
+            episode_steps=episode_steps,
+            expert_return=self.task.expert_return if at_evaluation_length else None,
+            random_return=self.task.random_return if at_evaluation_length else None,
+        )
+        append_evaluations(self.directory / "evaluations.csv", rows)
+        returns = summarize([result.environment_return for result in results])
+        name = f"evaluation/return_{episode_steps}"
+        metrics = {name: returns.mean}
+        if at_evaluation_length and rows[0].scaled_return is not None:
+            metrics["evaluation/scaled_return"] = float(np.mean([row.scaled_return for row in rows]))
+        self._log("interactive", "agent_steps", counters.agent_steps, metrics)
+        self._last_evaluation.update(metrics)
+        return metrics
+
+    def _rank(self) -> None:
+        """Appends the rewards of held-out videos, and of the agent's newest ones, to `ranking.csv`."""
+        if not self.demos.held_out or self.components.reward_model.reads_environment_reward:
+            return
+        videos: dict[str, list[Video]] = dict(self.demos.held_out)
+        agent_videos = self.components.agent_videos
+        if len(agent_videos):
+            count = self.run.training.evaluation.held_out_videos
+            videos["agent"] = agent_videos.newest(count)
+        rows = rank_videos(
+            self.components.reward_model,
+            videos,
+            self.demos.expert,
+            reference_rng(self.run.seed, self.counters.agent_steps),
+            self.counters.agent_steps,
+        )
+        append_ranking(self.directory / "ranking.csv", rows)
+        if all(kind in videos for kind in KINDS):
+            scores = ranking_scores(rows)
+            self._log("interactive", "agent_steps", self.counters.agent_steps, scores.metrics())
+            self.console.print(
+                f"the learned reward on held-out videos: Kendall's tau {scores.kendall_tau:.2f} (a perfect order has "
+                f"{scores.perfect_tau:.2f}), expert above half-good {scores.expert_above_half_good:.0%}, half-good "
+                f"above random {scores.half_good_above_random:.0%}"
+            )
+
+    def _showcase(self) -> None:
+        """Expert, agent and random from the same starts, with the reward along them, for the report."""
+        count = self.run.training.evaluation.showcase_episodes
+        if not count:
+            return
+        agent, steps = self.components.agent, self.budget.scheduled_steps(self.counters)
+        acts: dict[str, Act] = {
+            "agent": lambda observation: agent.act(observation, steps, explore=False),
+            "random": make_random(self.environment, self.run.seed),
+        }
+        if self.task.has_expert:
+            acts = {"expert": make_expert(self.run.task, self.environment), **acts}
+        episodes = play_showcase(
+            self.environment,
+            acts,
+            evaluation_seeds(self.run.seed, count),
+            self.components.reward_model,
+            self.demos.expert,
+            reference_rng(self.run.seed, self.counters.agent_steps),
+            self.counters.agent_steps,
+        )
+        write_showcase(self.directory, episodes)
+
+    def _log(self, phase: str, count_name: str, count: int, metrics: Metrics) -> None:
+        self.tracker.log(phase, count_name, count, self.counters.seconds, metrics)
+
+    def _shown(self) -> dict[str, float]:
+        """What stands beside the progress bar."""
+        short = {name.removeprefix("evaluation/"): value for name, value in self._last_evaluation.items()}
+        return {"episodes": self.counters.episodes, **short}
+
+    def _resume(self) -> None:
+        checkpoint = newest_checkpoint(self.directory / "checkpoints")
+        if checkpoint is None:
+            return
+        saved = load_checkpoint(checkpoint, self.components.stateful())
+        self.counters = saved.counters
+        self.rng = restore_generator(saved.random_state)
+        metrics = self.directory / "metrics.jsonl"
+        if metrics.exists():
+            with metrics.open("r+b") as file:
+                file.truncate(saved.metrics_bytes)
+        self.console.print(
+            f"resuming {self.directory} after {self.counters.alignment_steps:,} alignment steps and "
+            f"{self.counters.agent_steps:,} agent steps"
+        )
+
+    def _checkpoint_if_due(self) -> None:
+        if time.monotonic() - self._saved_at > 60 * self.run.training.checkpoint_minutes:
+            self._checkpoint()
+
+    def _checkpoint(self) -> None:
+        save_checkpoint(
+            self.directory / "checkpoints",
+            Progress(self.counters, dict(self.rng.bit_generator.state), self.tracker.bytes_written()),
+            self.components.stateful(),
+        )
+        self._saved_at = time.monotonic()
+
+    def _stop(self) -> bool:
+        self._checkpoint()
+        self.console.print(f"stopped after a checkpoint. {self._how_to_resume()}")
+        return False
+
+    def _how_to_resume(self) -> str:
+        if newest_checkpoint(self.directory / "checkpoints") is None:
+            return f"There is no checkpoint yet in {self.directory}: start again"
+        return f"Go on from the last checkpoint with: bootifol train --resume {self.directory}"
