@@ -24,6 +24,13 @@ def test_it_keeps_the_newest_episodes(count: int) -> None:
         np.testing.assert_array_equal(frames, moving_videos(count)[int(name.removeprefix("agent-"))])
 
 
+@pytest.mark.parametrize("count", [0, 2, 4, 7, 9])
+def test_the_newest_come_in_order_of_age(count: int) -> None:
+    names = [f"agent-{index}" for index in range(count)]
+    assert [video.name for video in filled(4, count).newest(3)] == names[-3:]
+    assert [video.name for video in filled(4, count).newest(9)] == names[-4:]
+
+
 def test_a_short_episode_stands_still_on_its_last_frame() -> None:
     ring = AgentVideos(2, FRAMES, SIZE)
     frames = moving_videos(2)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from small_demo_sets import FRAMES, SIZE, WriteSet, moving_videos
 
-from bootifol.demos.demo_set import DemoSet, find_demo_sets, open_demo_sets
+from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.demos.manifest import read_manifest
 from bootifol.demos.shards import videos_per_shard
 from bootifol.errors import BootifolError
@@ -176,27 +176,23 @@ def test_missing_places_give_a_sentence(tmp_path: Path, write_set: WriteSet) -> 
         DemoSet.open(directory)
 
 
-def test_a_directory_of_sets_opens_by_behavior(write_set: WriteSet, tmp_path: Path) -> None:
-    write_set(moving_videos(2), name="expert")
-    write_set(moving_videos(3, seed=1), name="random")
-    opened = open_demo_sets(tmp_path, needed=("expert", "random"))
-    assert {behavior: len(demo_set) for behavior, demo_set in opened.items()} == {"expert": 2, "random": 3}
-    with pytest.raises(BootifolError, match=r"holds no half_good videos \(only expert, random\)"):
-        open_demo_sets(tmp_path, needed=("half_good",))
-    assert list(find_demo_sets(tmp_path / "expert").values()) == [tmp_path / "expert"]
+def test_a_directory_of_sets_is_found_by_behavior(write_set: WriteSet, tmp_path: Path) -> None:
+    expert = write_set(moving_videos(2), name="a", behavior="expert")
+    random = write_set(moving_videos(3, seed=1), name="b", behavior="random")
+    assert find_demo_sets(tmp_path) == {"expert": expert, "random": random}
+    assert find_demo_sets(expert) == {"expert": expert}
     with pytest.raises(BootifolError, match="there is no demo set at"):
         find_demo_sets(tmp_path / "elsewhere")
+    write_set(moving_videos(3, seed=1), name="c", behavior="random")
+    with pytest.raises(BootifolError, match="both hold random videos"):
+        find_demo_sets(tmp_path)
 
 
-def test_opening_several_sets_verifies_the_small_ones(write_set: WriteSet, tmp_path: Path) -> None:
-    directory = write_set(moving_videos(2), name="expert")
-    shard = directory / "shard-00000.npy"
-    data = bytearray(shard.read_bytes())
-    data[-1] ^= 1
-    shard.write_bytes(data)
-    with pytest.raises(BootifolError, match="expert-000001"):
-        open_demo_sets(tmp_path)
-    assert set(open_demo_sets(tmp_path, verify_below=0)) == {"expert"}
+def test_a_set_with_another_one_inside_holds_both(write_set: WriteSet, tmp_path: Path) -> None:
+    expert = write_set(moving_videos(2), name="expert")
+    random = write_set(moving_videos(2, seed=1), name="random", behavior="random")
+    random.rename(expert / "random")
+    assert find_demo_sets(expert) == {"expert": expert, "random": expert / "random"}
 
 
 @pytest.mark.parametrize(

@@ -160,45 +160,23 @@ def find_demo_sets(path: Path | str) -> dict[str, Path]:
         Directories by behavior, at least one.
 
     Raises:
-        BootifolError: there is none.
+        BootifolError: there is none, or there are two of one behavior.
     """
     path = Path(path)
-    if (path / MANIFEST_NAME).is_file():
-        return {read_manifest(path).behavior: path}
-    found = sorted(path.glob(f"*/{MANIFEST_NAME}")) if path.is_dir() else []
+    found: dict[str, Path] = {}
+    for manifest in [*path.glob(MANIFEST_NAME), *sorted(path.glob(f"*/{MANIFEST_NAME}"))]:
+        behavior = read_manifest(manifest.parent).behavior
+        if behavior in found:
+            raise BootifolError(
+                f"{found[behavior]} and {manifest.parent} both hold {behavior} videos: move one of them away"
+            )
+        found[behavior] = manifest.parent
     if not found:
         raise BootifolError(
             f"there is no demo set at {path} (no {MANIFEST_NAME} in it or one directory below): record one "
             f"with `bootifol demos record --task TASK --out {path}`"
         )
-    return {manifest.parent.name: manifest.parent for manifest in found}
-
-
-def open_demo_sets(
-    path: Path | str, needed: Sequence[str] = (), verify_below: int = 10**9
-) -> dict[str, DemoSet]:
-    """Opens every demo set at a path, by behavior.
-
-    Args:
-        path: as for `find_demo_sets`.
-        needed: behaviors that must be there.
-        verify_below: sets with fewer bytes than this have every checksum compared.
-
-    Raises:
-        BootifolError: one is missing, unfinished or damaged.
-    """
-    paths = find_demo_sets(path)
-    for behavior in needed:
-        if behavior not in paths:
-            raise BootifolError(
-                f"{path} holds no {behavior} videos (only {_listed(sorted(paths))}): record some with "
-                f"`bootifol demos record --task TASK --behaviors {behavior} --out {path}`"
-            )
-    demo_sets = {behavior: DemoSet.open(directory) for behavior, directory in paths.items()}
-    for demo_set in demo_sets.values():
-        if sum(shard.bytes for shard in demo_set.manifest.shards) < verify_below:
-            demo_set.verify()
-    return demo_sets
+    return found
 
 
 def _listed(names: Sequence[str], most: int = 5) -> str:

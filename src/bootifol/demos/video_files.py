@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -34,6 +34,33 @@ class TimedFrame:
 
     seconds: float | None
     """After the first frame; None when the file does not know (folders of pictures, arrays)."""
+
+
+def video_paths(paths: Sequence[Path]) -> list[Path]:
+    """Finds the videos people mean: a folder without pictures of its own stands for the videos in it.
+
+    Returns:
+        Files and folders of pictures that `stream_video` reads, folders' contents in natural order of their names.
+
+    Raises:
+        BootifolError: a folder holds neither pictures nor videos.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if not path.is_dir() or _pictures(path):
+            found.append(path)
+            continue
+        inside = [
+            child
+            for child in sorted(path.iterdir(), key=_natural_order)
+            if child.suffix.lower() in (*VIDEO_SUFFIXES, ".npy") or (child.is_dir() and _pictures(child))
+        ]
+        if not inside:
+            raise BootifolError(
+                f"{path} holds no videos: give video files, or folders of them or of pictures"
+            )
+        found += inside
+    return found
 
 
 def stream_video(path: Path) -> Iterator[TimedFrame]:
@@ -114,9 +141,7 @@ def write_video(path: Path, frames: Frames, frames_per_second: float) -> None:
 
 
 def _stream_folder(path: Path) -> Iterator[TimedFrame]:
-    pictures = sorted(
-        (file for file in path.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES), key=_natural_order
-    )
+    pictures = _pictures(path)
     if not pictures:
         raise BootifolError(f"{path} holds no pictures: a folder should hold one video as png or jpg files")
     size: tuple[int, int] | None = None
@@ -133,6 +158,11 @@ def _stream_folder(path: Path) -> Iterator[TimedFrame]:
             )
         size = frame.shape[:2]
         yield TimedFrame(frame, None)
+
+
+def _pictures(folder: Path) -> list[Path]:
+    pictures = (file for file in folder.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES)
+    return sorted(pictures, key=_natural_order)
 
 
 def _natural_order(path: Path) -> list[tuple[int, str]]:

@@ -1,0 +1,168 @@
+"""`bootifol demos record | import | check`: videos in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from bootifol.demos.manifest import Manifest
+from bootifol.errors import BootifolError
+
+_HALF_GOOD_VIDEOS = 64
+
+
+def record(
+    task: str,
+    out: Path,
+    episodes: int = 200,
+    behaviors: tuple[Literal["expert", "half_good", "random", "still"], ...] = (
+        "expert",
+        "random",
+        "half_good",
+    ),
+    seed: int = 1,
+    episode_steps: int | None = None,
+    agent_size: int = 64,
+    video_size: int = 64,
+    profile: Literal["fast", "balanced", "full"] = "fast",
+    workers: int = 1,
+) -> int:
+    """Record videos of a task's bundled expert, and of others for comparison.
+
+    Each behavior becomes a demo set of its own: OUT/expert, OUT/random (the method learns to tell it from the expert)
+    and OUT/half_good (at most 64 videos, to see whether the learned reward ranks them between the two). Pictures only:
+    no actions and no rewards. Stop it whenever you like: the same command goes on where it stopped.
+
+    Args:
+        task: What to perform; `bootifol tasks` lists the names.
+        out: Directory of the demo sets, the one to give to `bootifol train --demos`.
+        episodes: Videos of each behavior.
+        behaviors: Who performs.
+        seed: The same seed records the same videos, to the byte.
+        episode_steps: Agent steps of a video; the task's training episode by default.
+        agent_size: Height and width, in pixels, of the agent's pictures in training (the larger size is rendered).
+        video_size: Height and width of the videos, in pixels.
+        profile: Render quality; training must use the same. fast costs a tenth of full.
+        workers: Processes that record side by side; the videos are the same for any number.
+    """
+    # Imported here: the simulators would slow down every other command's help.
+    from bootifol.demos.record import record as record_set
+    from bootifol.envs.pictures import PictureConfig
+
+    if not behaviors:
+        raise BootifolError("name at least one behavior, such as --behaviors expert random")
+    pictures = PictureConfig(agent_size=agent_size, video_size=video_size, profile=profile)
+    try:
+        for behavior in behaviors:
+            count = min(episodes, _HALF_GOOD_VIDEOS) if behavior == "half_good" else episodes
+            demo_set = record_set(
+                task, behavior, count, out / behavior, pictures, seed, episode_steps, workers
+            )
+            print(f"{out / behavior}: {_summary(demo_set.manifest)}")
+    except KeyboardInterrupt:
+        print("\nstopped; run the same command again and it goes on where it stopped")
+        return 130
+    print(
+        f"next: bootifol demos check {out}, then bootifol train --task {task} --demos {out} --out runs/{task}"
+    )
+    return 0
+
+
+def import_(
+    videos: Annotated[list[Path], tyro.conf.Positional],
+    out: Path,
+    frames: int = 61,
+    size: int = 64,
+    fps: float | None = None,
+    windows: Literal["all", "first"] = "all",
+    behavior: Literal["expert", "half_good", "random"] = "expert",
+) -> int:
+    """Make a demo set from your own videos: mp4, mov, webm or gif files, folders of png or jpg pictures, .npy arrays.
+
+    The largest centered square of every picture is cut out and resized. What was done to which file is written down
+    in OUT/BEHAVIOR/manifest.json, and OUT/BEHAVIOR/contact_sheet.png shows the result.
+
+    Args:
+        videos: Files, and folders of them; a folder of pictures is one video.
+        out: Directory of the demo sets, the one to give to `bootifol train --demos`.
+        frames: Frames of each video: the agent steps of the task's training episode, plus 1.
+        size: Height and width of the pictures, in pixels.
+        fps: Pictures per second, which should be the environment's; by default every picture is kept.
+        windows: all cuts a long file into one video after another; first takes the beginning of each file.
+        behavior: What the videos show.
+    """
+    from bootifol.demos.import_videos import Conversion, import_videos
+    from bootifol.demos.video_files import video_paths
+
+    files = video_paths(videos)
+    conversion = Conversion(frames=frames, size=size, frames_per_second=fps, windows=windows)
+    demo_set = import_videos(files, out / behavior, conversion, behavior)
+    manifest = demo_set.manifest
+    short = sum(video.length < manifest.frames for video in manifest.videos)
+    print(f"{demo_set.path}: {_summary(manifest)}, from {_count(len(files), 'file')}")
+    if short:
+        print(f"  {short} shorter than {frames} frames: they stand still on their last picture")
+    print(f"  look at {demo_set.path / 'contact_sheet.png'}")
+    print(f"next: bootifol demos check {out} --task TASK, then bootifol train --task TASK --demos {out}")
+    return 0
+
+
+def check(demos: Annotated[Path, tyro.conf.Positional], task: str | None = None) -> int:
+    """Read every byte of recorded or imported videos and say whether they are whole and worth learning from.
+
+    Exits with 0 when all is well, with 1 when the videos do not fit the task, with 2 when they are damaged.
+
+    Args:
+        demos: Directory of the demo sets, or one of them.
+        task: Also compare with this task and say what to do about each difference.
+    """
+    from bootifol.demos.check import check_demo_set
+    from bootifol.demos.demo_set import find_demo_sets
+
+    fits = True
+    for path in find_demo_sets(demos).values():
+        checked = check_demo_set(path, task)
+        manifest = checked.manifest
+        print(f"{path}: {_summary(manifest)}")
+        print(
+            f"  {checked.bytes_on_disk / 1e6:,.1f} MB in {_count(len(manifest.shards), 'file')}; every checksum agrees"
+        )
+        print(f"  {_origin(manifest)}")
+        for names in checked.duplicates:
+            print(f"  the same video {len(names)} times: {', '.join(names)}; keep one of them")
+        if checked.frozen and manifest.behavior != "still":
+            print(
+                f"  nothing moves in {', '.join(checked.frozen)}: leave them out, unless the task is to keep still"
+            )
+        for difference in checked.differences:
+            print(f"  {difference}")
+        if task is not None and not checked.differences:
+            print(f"  fits the task {task}")
+        print(f"  look at {checked.contact_sheet}")
+        fits = fits and not checked.differences
+    return 0 if fits else 1
+
+
+def _summary(manifest: Manifest) -> str:
+    rate = manifest.frames_per_second
+    seconds = f" ({manifest.frames / rate:.1f} s at {rate:g} a second)" if rate else ""
+    size = manifest.video_size
+    return (
+        f"{_count(len(manifest.videos), 'video')} of {manifest.frames} frames{seconds}, {size}×{size} pixels"
+    )
+
+
+def _origin(manifest: Manifest) -> str:
+    if manifest.task is None:
+        return f"imported as {manifest.behavior} videos"
+    return (
+        f"recorded: {manifest.behavior} in {manifest.task}, seed {manifest.seed}; train with "
+        f"--pictures.video-size {manifest.video_size} --pictures.agent-size {manifest.agent_size} "
+        f"--pictures.profile {manifest.render_profile}"
+    )
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

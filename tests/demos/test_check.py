@@ -1,0 +1,110 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from small_demo_sets import FRAMES, SIZE, WriteSet, moving_videos
+
+from bootifol.demos.check import check_demo_set, differences
+from bootifol.demos.contact_sheet import contact_sheet
+from bootifol.demos.manifest import Manifest, read_manifest
+from bootifol.envs.pictures import PictureConfig
+from bootifol.errors import BootifolError
+
+
+def test_duplicates_and_frozen_videos_are_named(write_set: WriteSet) -> None:
+    videos = moving_videos(6)
+    videos[4] = videos[1]
+    videos[2] = videos[2, :1]
+    checked = check_demo_set(write_set(videos))
+    assert checked.duplicates == (("drawn-expert-000001", "drawn-expert-000004"),)
+    assert checked.frozen == ("drawn-expert-000002",)
+    assert checked.bytes_on_disk == sum(
+        path.stat().st_size for path in checked.contact_sheet.parent.glob("*.npy")
+    )
+    assert Image.open(checked.contact_sheet).format == "PNG"
+
+
+def test_a_video_that_moves_in_one_pixel_is_not_frozen(write_set: WriteSet) -> None:
+    videos = np.zeros((1, FRAMES, SIZE, SIZE, 3), np.uint8)
+    videos[0, -1, 0, 0, 0] = 1
+    assert check_demo_set(write_set(videos)).frozen == ()
+
+
+def test_damage_and_unknown_tasks_give_a_sentence(write_set: WriteSet) -> None:
+    directory = write_set(moving_videos(4))
+    with pytest.raises(BootifolError, match="no task 'drawn'"):
+        check_demo_set(directory, "drawn")
+    shard = directory / "shard-00001.npy"
+    data = bytearray(shard.read_bytes())
+    data[-1] ^= 1
+    shard.write_bytes(data)
+    with pytest.raises(
+        BootifolError, match=r"shard-00001.npy is damaged: the pixels of drawn-expert-000003 "
+    ):
+        check_demo_set(directory)
+
+
+@pytest.fixture
+def fitting(write_set: WriteSet) -> Manifest:
+    """A manifest of recorded videos that fit drawn_reach at 8 pixels."""
+    return replace(read_manifest(write_set(moving_videos(1))), frames=31)
+
+
+EIGHT = PictureConfig(agent_size=8, video_size=8)
+
+
+def test_fitting_videos_differ_in_nothing(fitting: Manifest) -> None:
+    assert differences(fitting, "drawn_reach") == []
+    assert differences(fitting, "drawn_reach", EIGHT) == []
+    assert differences(replace(fitting, frames=62), "drawn_reach", EIGHT) == []
+
+
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        ({"task": "reacher_hard"}, "show the task reacher_hard"),
+        ({"action_repeat": 2}, "2 simulator steps after the other, and in drawn_reach it is 1"),
+        (
+            {"frames": 30},
+            "30 frames and an episode of drawn_reach has 31: record them again with --episode-steps 30",
+        ),
+        ({"video_size": 16}, "16×16 pixels and the run reads 8×8: pass --pictures.video-size 16"),
+        ({"render_profile": "full"}, "pass --pictures.profile full"),
+        ({"agent_size": 16}, "rendered at 16 pixels and the run renders at 8"),
+        (
+            {"task": None, "frames": 30, "agent_size": None, "render_profile": None},
+            "import them again with --frames 31",
+        ),
+    ],
+)
+def test_each_difference_comes_with_what_to_do(
+    fitting: Manifest, fields: dict[str, object], sentence: str
+) -> None:
+    found = differences(replace(fitting, **fields), "drawn_reach", EIGHT)  # type: ignore[arg-type]
+    assert len(found) == 1
+    assert sentence in found[0]
+
+
+def test_a_contact_sheet_shows_a_video_a_row_from_first_to_last_frame() -> None:
+    videos = np.zeros((2, 21, 96, 96, 3), np.uint8)
+    videos += np.arange(21, dtype=np.uint8)[None, :, None, None, None] + np.array([0, 100], np.uint8).reshape(
+        2, 1, 1, 1, 1
+    )
+    sheet = contact_sheet(videos, columns=3)
+    assert sheet.shape == (2 * 98 + 2, 3 * 98 + 2, 3)
+    middles = sheet[[50, 148]][:, [50, 148, 246], 0]
+    assert middles.tolist() == [[0, 10, 20], [100, 110, 120]]
+
+
+def test_short_videos_fill_fewer_columns() -> None:
+    assert contact_sheet(np.zeros((1, 2, 96, 96, 3), np.uint8), columns=10).shape == (100, 198, 3)
+
+
+def test_a_contact_sheet_of_a_damaged_directory_is_not_written(write_set: WriteSet, tmp_path: Path) -> None:
+    directory = write_set(moving_videos(2))
+    (directory / "shard-00000.npy").unlink()
+    with pytest.raises(BootifolError):
+        check_demo_set(directory)
+    assert not (directory / "contact_sheet.png").exists()

@@ -1,0 +1,88 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tyro
+
+from bootifol.cli import demos
+from bootifol.demos import record as recording
+from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.errors import BootifolError
+
+
+def record(out: Path, *more: str) -> int:
+    arguments = ["--task", "drawn_reach", "--episodes", "3", "--out", str(out), "--agent-size", "16"]
+    return tyro.cli(demos.record, args=[*arguments, "--video-size", "16", *more])
+
+
+def test_record_writes_one_set_a_behavior_and_check_approves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert record(tmp_path / "demos") == 0
+    sets = find_demo_sets(tmp_path / "demos")
+    assert sets == {name: tmp_path / "demos" / name for name in ("expert", "random", "half_good")}
+    assert {len(DemoSet.open(path)) for path in sets.values()} == {3}
+    assert tyro.cli(demos.check, args=[str(tmp_path / "demos"), "--task", "drawn_reach"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("every checksum agrees") == 3
+    assert printed.count("fits the task drawn_reach") == 3
+    assert "3 videos of 31 frames" in printed
+
+
+def test_check_of_another_task_says_what_to_do_and_exits_with_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record(tmp_path / "demos", "--behaviors", "random")
+    assert tyro.cli(demos.check, args=[str(tmp_path / "demos"), "--task", "reacher_hard"]) == 1
+    assert "the videos show the task drawn_reach" in capsys.readouterr().out
+
+
+def test_half_good_videos_are_few(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(demos, "_HALF_GOOD_VIDEOS", 2)
+    record(tmp_path / "demos", "--behaviors", "half_good", "random")
+    assert len(DemoSet.open(tmp_path / "demos" / "half_good")) == 2
+    assert len(DemoSet.open(tmp_path / "demos" / "random")) == 3
+
+
+def test_ctrl_c_says_how_to_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(plan: object, index: int) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(recording, "play", interrupted)
+        assert record(tmp_path / "demos") == 130
+    assert "run the same command again" in capsys.readouterr().out
+    assert record(tmp_path / "demos") == 0
+
+
+def test_import_takes_a_folder_of_videos(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "films"
+    folder.mkdir()
+    for number in (2, 10, 1):
+        np.save(folder / f"film{number}.npy", np.full((7, 20, 30, 3), number, np.uint8))
+    (folder / "notes.txt").write_text("not a video")
+    out = tmp_path / "demos"
+    assert (
+        tyro.cli(demos.import_, args=[str(folder), "--out", str(out), "--frames", "9", "--size", "16"]) == 0
+    )
+    demo_set = DemoSet.open(out / "expert")
+    assert [int(demo_set[i].frames[0, 0, 0, 0]) for i in range(3)] == [1, 2, 10]
+    printed = capsys.readouterr().out
+    assert "3 videos of 9 frames, 16×16 pixels, from 3 files" in printed
+    assert "3 shorter than 9 frames" in printed
+    assert tyro.cli(demos.check, args=[str(out), "--task", "drawn_reach"]) == 1
+    printed = capsys.readouterr().out
+    assert "import them again with --frames 31" in printed
+    assert "nothing moves in demos-expert-000000" in printed
+
+
+def test_wrong_places_give_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(BootifolError, match="there is no demo set at"):
+        demos.check(tmp_path / "nowhere")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(BootifolError, match="empty holds no videos"):
+        demos.import_([tmp_path / "empty"], tmp_path / "out")
+    with pytest.raises(BootifolError, match="no task 'reacher'"):
+        demos.record("reacher", tmp_path / "out")
