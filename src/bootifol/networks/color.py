@@ -3,12 +3,19 @@
 sRGB primaries and transfer curve, white point D65 (IEC 61966-2-1; CIE 15). Lab is scaled by the range that
 8-bit sRGB covers, so every channel lies in about [-1, 1]:
 `L: (L - 50) / 50`, `a: (a - 6.025) / 92.208`, `b: (b + 6.69) / 101.17`.
+
+One compiled pass over the pixels, with a table for the sRGB curve and one, interpolated, for Lab's cube root: written
+with tensor operations the same conversion took longer than the encoders of the `cpu` preset.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import numba
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 RGB_TO_XYZ = np.array(
     [
@@ -25,40 +32,80 @@ WHITE = RGB_TO_XYZ.sum(axis=1)
 LAB_CENTER = np.array([50.0, 6.025, -6.69])
 LAB_HALF_RANGE = np.array([50.0, 92.208, 101.17])
 
+ROOT_STEPS = 4096
+"""Intervals of the cube root's table; linear interpolation keeps normalized Lab within 1e-4."""
 
-def _linear_light() -> np.ndarray:
-    """The sRGB curve undone for each of the 256 byte values, float64 `[256]`."""
+Floats = NDArray[np.float32]
+
+
+def _linear_light() -> Floats:
+    """The sRGB curve undone for each of the 256 byte values: `[256]` in [0, 1]."""
     value = np.arange(256) / 255.0
-    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
-# XYZ / white is a sum of one table row per channel: the curve, the matrix and the white point in one lookup.
-_ROWS = _linear_light()[:, None, None] * (RGB_TO_XYZ / WHITE[:, None]).T[None]
-_TABLE = torch.from_numpy(_ROWS.transpose(1, 0, 2).reshape(3 * 256, 3).astype(np.float32))
+def _root_table() -> Floats:
+    """Lab's f (a cube root, linear near 0) on a grid over [0, 1]: `[ROOT_STEPS + 1, 2]` values and differences.
 
-# Lab from f(X), f(Y), f(Z), with the normalization folded in.
-_MIX = np.array([[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]]) / LAB_HALF_RANGE[:, None]
-_SHIFT = (np.array([-16.0, 0.0, 0.0]) - LAB_CENTER) / LAB_HALF_RANGE
+    The last interval is there because 1 itself, and rounding a little above it, must find a value.
+    """
+    grid = np.arange(ROOT_STEPS + 2) / ROOT_STEPS
+    delta = 6.0 / 29.0
+    value = np.where(grid > delta**3, np.cbrt(grid), grid / (3 * delta**2) + 4.0 / 29.0)
+    return np.stack([value[:-1], np.diff(value)], axis=1).astype(np.float32)
 
-_DELTA = 6.0 / 29.0
+
+_LINEAR = _linear_light()
+_ROOT = _root_table()
+_TO_GRID = (ROOT_STEPS * RGB_TO_XYZ / WHITE[:, None]).astype(np.float32)
+# L = 116 f(Y) - 16, a = 500 (f(X) - f(Y)), b = 200 (f(Y) - f(Z)), with the normalization folded in.
+_FACTOR = (np.array([116.0, 500.0, 200.0]) / LAB_HALF_RANGE).astype(np.float32)
+_OFFSET = ((np.array([-16.0, 0.0, 0.0]) - LAB_CENTER) / LAB_HALF_RANGE).astype(np.float32)
 
 
-def normalized_lab(rgb: torch.Tensor, dtype: torch.dtype = torch.float32) -> torch.Tensor:
-    """RGB to normalized Lab.
+def _convert_pixels(
+    rgb: NDArray[np.uint8],
+    linear: Floats,
+    to_grid: Floats,
+    root: Floats,
+    factor: Floats,
+    offset: Floats,
+    out: Floats,
+) -> None:
+    """Fills `out[i]`, normalized Lab, from `rgb[i]`; both `[pixels, 3]`."""
+    for i in range(rgb.shape[0]):
+        r = linear[rgb[i, 0]]
+        g = linear[rgb[i, 1]]
+        b = linear[rgb[i, 2]]
+        x = to_grid[0, 0] * r + to_grid[0, 1] * g + to_grid[0, 2] * b
+        y = to_grid[1, 0] * r + to_grid[1, 1] * g + to_grid[1, 2] * b
+        z = to_grid[2, 0] * r + to_grid[2, 1] * g + to_grid[2, 2] * b
+        cell = np.int32(x)
+        f_x = root[cell, 0] + (x - np.float32(cell)) * root[cell, 1]
+        cell = np.int32(y)
+        f_y = root[cell, 0] + (y - np.float32(cell)) * root[cell, 1]
+        cell = np.int32(z)
+        f_z = root[cell, 0] + (z - np.float32(cell)) * root[cell, 1]
+        out[i, 0] = factor[0] * f_y + offset[0]
+        out[i, 1] = factor[1] * (f_x - f_y) + offset[1]
+        out[i, 2] = factor[2] * (f_y - f_z) + offset[2]
+
+
+_compiled: Callable[..., None] = numba.njit(nogil=True, fastmath=True)(_convert_pixels)
+
+
+def normalized_lab(rgb: NDArray[np.uint8], dtype: torch.dtype = torch.float32) -> torch.Tensor:
+    """RGB to normalized Lab, about 10 ns a pixel.
 
     Args:
-        rgb: uint8 `[..., 3]`.
+        rgb: uint8 `[N, H, W, 3]`.
         dtype: float32, or bfloat16 where the encoders compute in it.
 
     Returns:
-        `dtype` `[..., 3]`: channel 0 is L (view 1), channels 1 and 2 are a and b (view 2), about [-1, 1].
+        `dtype` `[N, 3, H, W]`, channels last in memory, about [-1, 1]: channel 0 is L (view 1), channels 1 and 2
+        are a and b (view 2).
     """
-    table = _TABLE.to(rgb.device)
-    index = rgb.to(torch.int32)
-    x = table[index[..., 0]]
-    x += table[index[..., 1] + 256]
-    x += table[index[..., 2] + 512]
-    curved = torch.where(x > _DELTA**3, x.pow(1.0 / 3.0), x / (3 * _DELTA**2) + 4.0 / 29.0)
-    mix = torch.tensor(_MIX.T, dtype=torch.float32, device=rgb.device)
-    shift = torch.tensor(_SHIFT, dtype=torch.float32, device=rgb.device)
-    return (curved @ mix + shift).to(dtype)
+    lab = np.empty(rgb.shape, np.float32)
+    pixels = np.ascontiguousarray(rgb).reshape(-1, 3)
+    _compiled(pixels, _LINEAR, _TO_GRID, _ROOT, _FACTOR, _OFFSET, lab.reshape(-1, 3))
+    return torch.from_numpy(lab).to(dtype).permute(0, 3, 1, 2)

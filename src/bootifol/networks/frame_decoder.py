@@ -7,13 +7,15 @@ from typing import cast
 import torch
 from torch import nn
 
-from bootifol.networks.frame_encoders import HIDDEN_WIDTH, KERNEL, STATE_SIZE, STRIDE, WIDTHS, picture_sizes
+from bootifol.networks.frame_encoders import HIDDEN_WIDTH, STATE_SIZE, WIDTHS, picture_sizes
+from bootifol.networks.strided_convolution import StridedTransposedConvolution
 
 
 class FrameDecoder(nn.Module):
-    """State to picture: two 1x1 convolutions, then transposed 5x5 stride-2 convolutions (1, 5, 13, 30, 64 pixels).
+    """State to picture: two 1x1 convolutions, then transposed 5x5 stride-2 convolutions.
 
-    Output padding is whatever brings a layer back to the size the encoder had: 0, 0, 1, 1 for 64 pixels.
+    The pictures grow through the sizes the encoder shrank them through (1, 5, 13, 30, 64 pixels). The 1x1
+    convolutions see one pixel, so they are linear layers.
 
     Args:
         video_size: the picture's side in pixels.
@@ -23,26 +25,25 @@ class FrameDecoder(nn.Module):
 
     def __init__(self, video_size: int, width_divisor: int = 1, leak: float = 0.2) -> None:
         super().__init__()
-        sizes = picture_sizes(video_size)[::-1]
+        sizes = picture_sizes(video_size)[-2::-1]
         hidden = HIDDEN_WIDTH // width_divisor
-        widths = [hidden, *(width // width_divisor for width in WIDTHS[: len(sizes) - 2][::-1]), 3]
-        layers: list[nn.Module] = [
-            nn.Conv2d(STATE_SIZE, hidden, 1),
+        widths = [hidden, *(width // width_divisor for width in WIDTHS[: len(sizes) - 1][::-1])]
+        self.pointwise = nn.Sequential(
+            nn.Linear(STATE_SIZE, hidden),
             nn.LeakyReLU(leak),
-            nn.Conv2d(hidden, hidden, 1, bias=False),
-            nn.BatchNorm2d(hidden),
+            nn.Linear(hidden, hidden, bias=False),
+            nn.BatchNorm1d(hidden),
             nn.LeakyReLU(leak),
-        ]
-        for index, (before, after) in enumerate(zip(widths, widths[1:], strict=False)):
-            last = index == len(widths) - 2
-            padding = sizes[index + 1] - ((sizes[index] - 1) * STRIDE + KERNEL)
-            layers.append(
-                nn.ConvTranspose2d(before, after, KERNEL, STRIDE, output_padding=padding, bias=last)
-            )
-            if not last:
-                layers += [nn.BatchNorm2d(after), nn.LeakyReLU(leak)]
-        self.layers = nn.Sequential(*layers)
+        )
+        self.strided = nn.Sequential()
+        for before, after, size in zip(widths[:-1], widths[1:], sizes[:-1], strict=True):
+            self.strided.append(StridedTransposedConvolution(before, after, size))
+            self.strided.append(nn.BatchNorm2d(after))
+            self.strided.append(nn.LeakyReLU(leak))
+        self.strided.append(StridedTransposedConvolution(widths[-1], 3, sizes[-1]))
+        self.bias = nn.Parameter(torch.zeros(3, 1, 1))
 
     def forward(self, states: torch.Tensor) -> torch.Tensor:
         """States `[N, 128]` to normalized Lab `[N, 3, H, W]`."""
-        return cast(torch.Tensor, self.layers(states[:, :, None, None]))
+        pictures = self.strided(self.pointwise(states)[:, :, None, None])
+        return cast(torch.Tensor, pictures + self.bias.to(pictures.dtype))

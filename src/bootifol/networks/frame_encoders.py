@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import cast
 
 import torch
 from torch import nn
 
 from bootifol.errors import BootifolError
+from bootifol.networks.strided_convolution import KERNEL, StridedConvolution, small_size
 
 VIEW_SIZE = 64
 """Numbers per view; a state s has two views, hence 128 (the size the LSTM and the decoder read)."""
 
 STATE_SIZE = 2 * VIEW_SIZE
 
-KERNEL = 5
-STRIDE = 2
 WIDTHS = (64, 128, 256, 512)
 """Channels of the 5x5 stride-2 layers in the paper."""
 
@@ -30,15 +30,15 @@ def picture_sizes(video_size: int) -> list[int]:
     its last strided layer. Layers are added until one pixel is left, so other sizes work where that happens.
 
     Raises:
-        BootifolError: the size never reaches exactly one pixel within four layers.
+        BootifolError: the size does not come down to exactly one pixel in two to four layers.
     """
     sizes = [video_size]
     while sizes[-1] >= KERNEL and len(sizes) <= len(WIDTHS):
-        sizes.append((sizes[-1] - KERNEL) // STRIDE + 1)
+        sizes.append(small_size(sizes[-1]))
     if sizes[-1] != 1 or len(sizes) < 3:
         raise BootifolError(
-            f"the frame encoder cannot read {video_size}x{video_size} videos: its 5x5 stride-2 layers must end on "
-            "one pixel; use videos of 64x64 (the paper) or 32x32"
+            f"the frame encoder cannot read {video_size}x{video_size} videos: its 5x5 stride-2 layers must "
+            "end on one pixel; use videos of 64x64 (the paper) or 32x32"
         )
     return sizes
 
@@ -46,8 +46,8 @@ def picture_sizes(video_size: int) -> list[int]:
 class ViewEncoder(nn.Module):
     """One of g_theta1, g_theta2: strided 5x5 convolutions, then two 1x1 convolutions.
 
-    Every layer but the last is convolution, BatchNorm, LeakyReLU. Convolutions before a BatchNorm have no bias
-    (the BatchNorm has one).
+    The 1x1 convolutions see one pixel, so they are linear layers. Every layer but the last is followed by BatchNorm
+    and LeakyReLU and has no bias of its own (the BatchNorm has one).
 
     Args:
         channels: of the view, 1 for L and 2 for ab.
@@ -58,23 +58,24 @@ class ViewEncoder(nn.Module):
 
     def __init__(self, channels: int, video_size: int, width_divisor: int = 1, leak: float = 0.2) -> None:
         super().__init__()
-        strided = len(picture_sizes(video_size)) - 1
-        widths = [channels, *(width // width_divisor for width in WIDTHS[:strided])]
+        layers = len(picture_sizes(video_size)) - 1
+        widths = [channels, *(width // width_divisor for width in WIDTHS[:layers])]
         hidden = HIDDEN_WIDTH // width_divisor
-        layers: list[nn.Module] = []
-        for before, after in zip(widths, widths[1:], strict=False):
-            layers += [
-                nn.Conv2d(before, after, KERNEL, STRIDE, bias=False),
-                nn.BatchNorm2d(after),
-                nn.LeakyReLU(leak),
-            ]
-        layers += [nn.Conv2d(widths[-1], hidden, 1, bias=False), nn.BatchNorm2d(hidden), nn.LeakyReLU(leak)]
-        layers += [nn.Conv2d(hidden, VIEW_SIZE, 1)]
-        self.layers = nn.Sequential(*layers)
+        self.strided = nn.Sequential()
+        for before, after in pairwise(widths):
+            self.strided.append(StridedConvolution(before, after))
+            self.strided.append(nn.BatchNorm2d(after))
+            self.strided.append(nn.LeakyReLU(leak))
+        self.pointwise = nn.Sequential(
+            nn.Linear(widths[-1], hidden, bias=False),
+            nn.BatchNorm1d(hidden),
+            nn.LeakyReLU(leak),
+            nn.Linear(hidden, VIEW_SIZE),
+        )
 
     def forward(self, view: torch.Tensor) -> torch.Tensor:
         """`[N, C, H, W]` to `[N, 64]`."""
-        return cast(torch.Tensor, self.layers(view)).flatten(1)
+        return cast(torch.Tensor, self.pointwise(self.strided(view).flatten(1)))
 
 
 class FrameEncoder(nn.Module):
@@ -86,5 +87,5 @@ class FrameEncoder(nn.Module):
         self.color = ViewEncoder(2, video_size, width_divisor, leak)
 
     def forward(self, lab: torch.Tensor) -> torch.Tensor:
-        """Normalized Lab `[N, 3, H, W]` to states `[N, 128]`; the first 64 numbers encode L, the others ab."""
+        """Normalized Lab `[N, 3, H, W]` to states `[N, 128]`: first the 64 numbers of L, then those of ab."""
         return torch.cat([self.lightness(lab[:, :1]), self.color(lab[:, 1:])], dim=1)

@@ -126,7 +126,7 @@ class BootifolRewardModel:
         self._optimizer.zero_grad(set_to_none=True)
         total, metrics, distance = self._losses(videos[:, drawn.kept], drawn)
         try:
-            _refuse_if_not_finite(float(total), self.version, metrics)
+            _refuse_if_not_finite(metrics["loss/total"], self.version, metrics)
             total.backward()  # type: ignore[no-untyped-call]
             gradients = [p.grad for p in self.networks.parameters() if p.grad is not None]
             norm = float(torch.nn.utils.get_total_norm(gradients))
@@ -217,8 +217,7 @@ class BootifolRewardModel:
     def _views(self, frames: Frames) -> torch.Tensor:
         """uint8 `[N, H, W, 3]` to normalized Lab `[N, 3, H, W]`, channels last in memory."""
         dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32
-        rgb = torch.from_numpy(np.ascontiguousarray(frames)).to(self.device)
-        return normalized_lab(rgb, dtype).permute(0, 3, 1, 2)
+        return normalized_lab(frames, dtype).to(self.device)
 
     def _aggregate(self, rewards: torch.Tensor) -> torch.Tensor:
         """Rewards by reference `[R, T]` to `[T]`."""

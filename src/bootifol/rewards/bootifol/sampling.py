@@ -71,11 +71,13 @@ def draw(config: BootifolConfig, videos: int, frames: int, rng: np.random.Genera
 def _near(count: int, window: int) -> NDArray[np.bool_]:
     """`[count, count]`: frames within the window of each frame, itself excepted."""
     distance = np.abs(np.arange(count)[:, None] - np.arange(count))
-    return (distance <= window) & (distance > 0)
+    near: NDArray[np.bool_] = (distance <= window) & (distance > 0)
+    return near
 
 
 def _draw_among(anchors: Indices, allowed: NDArray[np.bool_], rng: np.random.Generator) -> Indices:
     """One of the allowed frames for each anchor, uniformly: `allowed[a, j]` says whether anchor a may take j."""
     order = np.argsort(~allowed, axis=1, kind="stable")
     choices = allowed.sum(1)[anchors]
-    return order[anchors, (rng.random(anchors.shape) * choices).astype(np.int64)]
+    drawn: Indices = order[anchors, (rng.random(anchors.shape) * choices).astype(np.int64)]
+    return drawn
