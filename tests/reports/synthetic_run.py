@@ -3,10 +3,10 @@
 import json
 from pathlib import Path
 
-import av
 import numpy as np
 from PIL import Image, ImageDraw
 
+from bootifol.demos.video_files import write_video
 from bootifol.evaluation.tables import EvaluationRow, RankingRow, append_evaluations, append_ranking
 from bootifol.files import write_arrays
 from bootifol.types import Arrays, Frames
@@ -135,7 +135,7 @@ def _write_showcase(run_dir: Path, rng: np.random.Generator, final: float) -> No
             )
             arrays[f"environment_return/{kind}/{start}"] = np.array([float((distance[1:] < 0.3).sum())])
             arrays[f"seed/{kind}/{start}"] = np.array([500 + start])
-            _write_mp4(run_dir / "videos" / f"{kind}-{start}.mp4", frames)
+            write_video(run_dir / "videos" / f"{kind}-{start}.mp4", frames, 20.0)
     write_arrays(run_dir / "showcase.safetensors", arrays)
 
 
@@ -162,12 +162,3 @@ def _reach(
 def _joints(angles: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
     elbow = size + 0.42 * size * np.array([np.cos(angles[0]), np.sin(angles[0])])
     return elbow, elbow + 0.42 * size * np.array([np.cos(angles.sum()), np.sin(angles.sum())])
-
-
-def _write_mp4(path: Path, frames: Frames) -> None:
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=20)
-        stream.height, stream.width, stream.pix_fmt = frames.shape[1], frames.shape[2], "yuv420p"
-        for picture in frames:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-        container.mux(stream.encode())

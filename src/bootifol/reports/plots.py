@@ -69,23 +69,36 @@ STYLE: Any = {
 
 @dataclass(frozen=True)
 class RunLook:
-    """How one run is drawn wherever runs are compared: color by method, dashes by seed."""
+    """How one run is drawn wherever runs are compared."""
 
     run: RunFiles
+    label: str
     color: str
     dashes: Any
 
 
 def looks_of(runs: Sequence[RunFiles]) -> list[RunLook]:
-    """Gives every run its look; a single run has the agent's color."""
-    methods = list(dict.fromkeys(run.method for run in runs))
-    seen: dict[str, int] = {}
+    """Gives every run its look: color by method and dashes by seed; a single run has the agent's color.
+
+    Where method and seed do not tell runs apart (variants of one method), each has its own color and the name of
+    its directory.
+    """
+    distinct = len({run.label for run in runs}) == len(runs)
+    groups = [run.method if distinct else str(run.path) for run in runs]
+    order = list(dict.fromkeys(groups))
     looks = []
-    for run in runs:
-        number = seen.get(run.method, 0)
-        seen[run.method] = number + 1
-        color = RUN_COLORS[methods.index(run.method) % len(RUN_COLORS)]
-        looks.append(RunLook(run, color, RUN_DASHES[number % len(RUN_DASHES)]))
+    for number, (run, group) in enumerate(zip(runs, groups, strict=True)):
+        color = order.index(group)
+        # Dashes tell apart the runs of one group, and the groups that share a color when colors run out.
+        dashes = groups[:number].count(group) + color // len(RUN_COLORS)
+        looks.append(
+            RunLook(
+                run=run,
+                label=run.label if distinct else run.path.name,
+                color=RUN_COLORS[color % len(RUN_COLORS)],
+                dashes=RUN_DASHES[dashes % len(RUN_DASHES)],
+            )
+        )
     return looks
 
 
@@ -109,14 +122,17 @@ def svg_data_uri(figure: Figure) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode("ascii")
 
 
-def return_curves(looks: Sequence[RunLook], scaled: bool) -> Figure | None:
-    """Evaluation returns over agent steps, with the levels of expert and random."""
+def return_curves(looks: Sequence[RunLook], scaled: bool, by_time: bool = False) -> Figure | None:
+    """Evaluation returns over agent steps or minutes, with the levels of expert and random."""
     with house_style():
         figure = Figure(figsize=HALF_WIDTH, layout="constrained")
-        return figure if draw_return_curves(figure.add_subplot(), looks, scaled) else None
+        if not draw_return_curves(figure.add_subplot(), looks, scaled, by_time):
+            return None
+        _legend(figure, looks)
+        return figure
 
 
-def draw_return_curves(axes: Axes, looks: Sequence[RunLook], scaled: bool) -> bool:
+def draw_return_curves(axes: Axes, looks: Sequence[RunLook], scaled: bool, by_time: bool = False) -> bool:
     """Draws mean and bootstrap interval of each evaluation; False where there is nothing to draw.
 
     The curve is of the shortest episodes (those evaluated along the way). Where the return is scaled, so that
@@ -125,41 +141,41 @@ def draw_return_curves(axes: Axes, looks: Sequence[RunLook], scaled: bool) -> bo
     drawn = False
     levels: tuple[float, float] | None = (0.0, 1.0) if scaled else None
     for look in looks:
-        lengths = look.run.episode_lengths()
+        lengths = look.run.episode_lengths(scaled)
         if not lengths:
             continue
-        curve = _evaluation_curve(look.run.evaluations_of(lengths[0]), scaled)
+        curve = _evaluation_curve(look.run.evaluations_of(lengths[0]), scaled, by_time)
         if not curve:
             continue
         drawn = True
         levels = levels or look.run.return_levels(lengths[0])
-        steps = np.array([point.agent_steps for point in curve])
+        when = np.array([point.when for point in curve])
         mean = np.array([point.mean for point in curve])
         axes.fill_between(
-            steps,
+            when,
             [point.low for point in curve],
             [point.high for point in curve],
             color=look.color,
             alpha=0.16 if len(looks) == 1 else 0.09,
             linewidth=0,
         )
-        label = "agent" if len(looks) == 1 else look.run.label
         marker = "o" if len(curve) < 40 else None
         axes.plot(
-            steps, mean, color=look.color, linestyle=look.dashes, marker=marker, markersize=3, label=label
+            when, mean, color=look.color, linestyle=look.dashes, marker=marker, markersize=3, label=look.label
         )
         if len(looks) == 1:
-            _scatter_episodes(axes, look, lengths[0], scaled)
+            _scatter_episodes(axes, look, lengths[0], scaled, by_time)
         if scaled and len(lengths) > 1:
-            _draw_long_evaluations(axes, look, lengths[-1], alone=len(looks) == 1)
+            _draw_long_evaluations(axes, look, lengths[-1], by_time, alone=len(looks) == 1)
     if not drawn:
         return False
     if levels is not None:
         _draw_levels(axes, *levels)
     axes.set_ylabel("scaled return" if scaled else "return of an episode")
-    _agent_step_axis(axes)
-    if len(looks) > 1:
-        axes.legend(loc="lower right", ncols=1, handlelength=2.6)
+    if by_time:
+        _step_axis(axes, "minutes of wall-clock time")
+    else:
+        _agent_step_axis(axes)
     return True
 
 
@@ -210,21 +226,27 @@ def ranking_plot(rows: Sequence[RankingRow]) -> Figure:
 
 @dataclass(frozen=True)
 class _Point:
-    agent_steps: int
+    when: float
+    """Agent steps or minutes."""
+
     mean: float
     low: float
     high: float
 
 
-def _evaluation_curve(grouped: dict[int, list[EvaluationRow]], scaled: bool) -> list[_Point]:
+def _evaluation_curve(grouped: dict[int, list[EvaluationRow]], scaled: bool, by_time: bool) -> list[_Point]:
     points = []
-    for agent_steps, rows in grouped.items():
+    for rows in grouped.values():
         values = _values(rows, scaled)
         if values:
             summary = summarize(values, resamples=1000)
             low, high = summary.interval or (summary.mean, summary.mean)
-            points.append(_Point(agent_steps, summary.mean, low, high))
+            points.append(_Point(_when(rows[0], by_time), summary.mean, low, high))
     return points
+
+
+def _when(row: EvaluationRow, by_time: bool) -> float:
+    return row.seconds / 60 if by_time else float(row.agent_steps)
 
 
 def _values(rows: Sequence[EvaluationRow], scaled: bool) -> list[float]:
@@ -233,20 +255,20 @@ def _values(rows: Sequence[EvaluationRow], scaled: bool) -> list[float]:
     return [row.environment_return for row in rows]
 
 
-def _scatter_episodes(axes: Axes, look: RunLook, episode_steps: int, scaled: bool) -> None:
+def _scatter_episodes(axes: Axes, look: RunLook, episode_steps: int, scaled: bool, by_time: bool) -> None:
     points = [
-        (agent_steps, value)
-        for agent_steps, rows in look.run.evaluations_of(episode_steps).items()
+        (_when(rows[0], by_time), value)
+        for rows in look.run.evaluations_of(episode_steps).values()
         for value in _values(rows, scaled)
     ]
-    steps, values = zip(*points, strict=True)
-    axes.scatter(steps, values, s=7, color=look.color, alpha=0.22, linewidth=0)
+    when, values = zip(*points, strict=True)
+    axes.scatter(when, values, s=7, color=look.color, alpha=0.22, linewidth=0)
 
 
-def _draw_long_evaluations(axes: Axes, look: RunLook, episode_steps: int, alone: bool) -> None:
-    for point in _evaluation_curve(look.run.evaluations_of(episode_steps), scaled=True):
+def _draw_long_evaluations(axes: Axes, look: RunLook, episode_steps: int, by_time: bool, alone: bool) -> None:
+    for point in _evaluation_curve(look.run.evaluations_of(episode_steps), True, by_time):
         axes.errorbar(
-            point.agent_steps,
+            point.when,
             point.mean,
             yerr=[[point.mean - point.low], [point.high - point.mean]],
             color=look.color,
@@ -260,7 +282,7 @@ def _draw_long_evaluations(axes: Axes, look: RunLook, episode_steps: int, alone:
         if alone:
             axes.annotate(
                 f"{episode_steps}-step\nepisodes",
-                (point.agent_steps, point.mean),
+                (point.when, point.mean),
                 xytext=(-9, -22),
                 textcoords="offset points",
                 ha="right",
@@ -317,9 +339,26 @@ def _metric_figure(looks: Sequence[RunLook], panels: Sequence[tuple[str, str]], 
                 _step_axis(axes, "gradient steps")
             else:
                 _agent_step_axis(axes)
-        if len(looks) > 1:
-            figure.axes[-1].legend(loc="best", handlelength=2.6)
+        _legend(figure, looks)
         return figure
+
+
+def _legend(figure: Figure, looks: Sequence[RunLook]) -> None:
+    """A legend above the plots, where several runs are compared."""
+    if len(looks) == 1:
+        return
+    lines: dict[str, Any] = {}
+    for axes in figure.axes:
+        for line, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            lines.setdefault(label, line)
+    figure.legend(
+        list(lines.values()),
+        list(lines),
+        loc="outside upper left",
+        ncols=3,
+        handlelength=2.4,
+        columnspacing=1.2,
+    )
 
 
 def _is_drawable(curve: Curve | None) -> bool:
@@ -334,7 +373,7 @@ def _draw_binned(axes: Axes, curve: Curve, look: RunLook, alone: bool) -> None:
         _binned(curve, curve.values, np.mean),
         color=look.color,
         linestyle=look.dashes,
-        label=look.run.label,
+        label=look.label,
     )
     if alone:
         low = _binned(curve, curve.values, lambda values: np.quantile(values, 0.1))

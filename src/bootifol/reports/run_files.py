@@ -109,9 +109,10 @@ class RunFiles:
         """Numbers of the starts of the showcase."""
         return sorted({start for _, start in self.showcase})
 
-    def episode_lengths(self) -> list[int]:
-        """Lengths of the evaluation episodes, shortest first."""
-        return sorted({row.episode_steps for row in self.evaluations})
+    def episode_lengths(self, scaled: bool = False) -> list[int]:
+        """Lengths of the evaluation episodes, shortest first; on request only of those that have a scale."""
+        rows = self.evaluations
+        return sorted({row.episode_steps for row in rows if not scaled or row.scaled_return is not None})
 
     def evaluations_of(self, episode_steps: int) -> dict[int, list[EvaluationRow]]:
         """Evaluations with episodes of one length, by agent steps of training in rising order."""
@@ -227,8 +228,8 @@ def _read_metrics(path: Path, notes: list[str]) -> tuple[dict[tuple[str, str], C
         for name, value in record.items():
             if name == "seconds" and _is_finite(value):
                 seconds[phase] = max(seconds.get(phase, 0.0), float(value))
-            elif name not in ("phase", counter) and isinstance(value, int | float):
-                if _is_finite(value):
+            elif name not in ("phase", counter, "seconds") and isinstance(value, int | float | None):
+                if value is not None and _is_finite(value):
                     steps, values = points.setdefault((phase, name), ([], []))
                     steps.append(float(record[counter]))
                     values.append(float(value))

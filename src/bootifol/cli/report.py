@@ -1,0 +1,23 @@
+"""`bootifol report`: what runs learned, as one HTML file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+def report(runs: Annotated[list[Path], tyro.conf.Positional], out: Path | None = None) -> int:
+    """Write what one run learned, or several side by side, as one HTML file that opens in any browser.
+
+    Args:
+        runs: Directories that `bootifol train` wrote; a run in progress will do.
+        out: The file to write; by default report.html in the run's directory, or here for several runs.
+    """
+    # Imported here: matplotlib would slow down every other command's help.
+    from bootifol.reports.html import report as write_report
+
+    target = out if out is not None else (runs[0] if len(runs) == 1 else Path()) / "report.html"
+    print(f"report: {write_report(runs, target)}")
+    return 0

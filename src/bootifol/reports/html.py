@@ -1,0 +1,329 @@
+"""The report: one HTML file that holds everything it shows and asks the network for nothing."""
+
+from __future__ import annotations
+
+import base64
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from bootifol.errors import BootifolError
+from bootifol.evaluation.summary import Summary
+from bootifol.files import written_aside
+from bootifol.reports import plots
+from bootifol.reports.film_strip import KINDS, reward_above_film_strip, videos_of_start
+from bootifol.reports.findings import FinalReturn, Finding, final_return, findings, number, scores_or_none
+from bootifol.reports.plots import KIND_COLORS, RunLook, looks_of, svg_data_uri, thousands
+from bootifol.reports.run_files import COUNTERS, RunFiles, read_run
+
+SHOWN_STARTS = 4
+"""Starts shown with pictures and videos; more would make the file heavy and tell little."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """A figure, its title, and one line on how to read it and what healthy looks like."""
+
+    title: str
+    image: str
+    """Data URI."""
+
+    caption: str
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One number of the headline."""
+
+    name: str
+    value: str
+    detail: str
+
+
+@dataclass(frozen=True)
+class PlayedVideo:
+    """An mp4 that plays in the page."""
+
+    kind: str
+    color: str
+    source: str
+    """Data URI."""
+
+    detail: str
+
+
+@dataclass(frozen=True)
+class RunSection:
+    """Everything the report says about one run."""
+
+    run: RunFiles
+    anchor: str
+    color: str
+    tiles: Sequence[Tile]
+    findings: Sequence[Finding]
+    videos: Sequence[Sequence[PlayedVideo]]
+    """Expert and agent of each start."""
+
+    strips: Sequence[Card]
+    curves: Sequence[Card]
+    ranking: Sequence[Card]
+    losses: Sequence[Card]
+    other_metrics: Sequence[Card]
+    config: Sequence[tuple[str, str]]
+
+
+LOSSES = {
+    "loss/multiview": (
+        "L_S: two views agree",
+        "Tells whether the lightness and the color of one frame are recognized as belonging together. "
+        "Healthy: falls fast, then levels off.",
+    ),
+    "loss/triplet": (
+        "L_triplet: near in time, near in space",
+        "Neighboring frames should lie closer than distant ones. Healthy: falls far below 1, its value for an "
+        "encoder that sees no difference; 0 means the margin is met everywhere.",
+    ),
+    "loss/autoencoder": (
+        "L_ae: pictures can be redrawn",
+        "Squared error of the redrawn frame. Healthy: falls steadily; a plateau at the start means a blank picture.",
+    ),
+    "loss/prediction": (
+        "L_Z: the next state is foreseen",
+        "The next states, predicted from the past, against the other frames of the video. Healthy: falls and stays "
+        "low; a rise in the Interactive Phase means the agent does new things.",
+    ),
+    "loss/sequence": (
+        "L_O: expert and other videos are told apart",
+        "The contrast that makes the reward. Healthy: falls in alignment, and rises again while interacting, "
+        "because the agent's videos come to look like the expert's. At 0 it teaches nothing more.",
+    ),
+    "loss/total": (
+        "All losses together",
+        "The weighted sum that is minimized. Healthy: falls in alignment and has no sudden jumps afterwards.",
+    ),
+}
+"""Title and caption of each loss."""
+
+
+def report(run_dirs: Sequence[Path], out: Path) -> Path:
+    """Writes the report of one run, or of several side by side, and returns its path.
+
+    Args:
+        run_dirs: directories that `train` wrote, of finished runs or runs in progress.
+        out: the HTML file.
+
+    Raises:
+        BootifolError: there is no run, or a directory is not one.
+    """
+    if not run_dirs:
+        raise BootifolError("there is no run to report on; name the directory of one at least")
+    runs = [read_run(run_dir) for run_dir in run_dirs]
+    looks = looks_of(runs)
+    page = _template_environment().get_template("page.html")
+    html = page.render(
+        title=_title(runs),
+        sections=[_section(look, f"run-{number}", alone=len(runs) == 1) for number, look in enumerate(looks)],
+        comparison=_curve_cards(looks) + _loss_cards(looks) if len(runs) > 1 else [],
+        report_command=shlex.join(["bootifol", "report", *map(str, run_dirs), "--out", str(out)]),
+        kind_colors=KIND_COLORS,
+    )
+    with written_aside(out) as aside:
+        aside.write_text(html)
+    return out
+
+
+def _template_environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("bootifol.reports", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def _title(runs: Sequence[RunFiles]) -> str:
+    return ", ".join(dict.fromkeys(run.task.replace("_", " ").title() for run in runs))
+
+
+def _section(look: RunLook, anchor: str, alone: bool) -> RunSection:
+    run = look.run
+    single = looks_of([run])
+    return RunSection(
+        run=run,
+        anchor=anchor,
+        color=look.color,
+        tiles=_tiles(run),
+        findings=findings(run),
+        videos=_video_rows(run),
+        strips=_strip_cards(run),
+        curves=_curve_cards(single),
+        ranking=_ranking_cards(run),
+        losses=_loss_cards(single) if alone else [],
+        other_metrics=_other_cards(single),
+        config=list(flattened(run.config)),
+    )
+
+
+def _tiles(run: RunFiles) -> list[Tile]:
+    final = final_return(run)
+    tiles = [] if final is None else _return_tiles(run, final)
+    tiles.append(Tile("Agent steps", thousands(run.agent_steps), f"{run.agent_steps:,} actions"))
+    if run.seconds is not None:
+        tiles.append(Tile("Wall-clock time", duration(run.seconds), f"preset {run.preset}"))
+    return tiles
+
+
+def _return_tiles(run: RunFiles, final: FinalReturn) -> list[Tile]:
+    episodes = f"{final.environment_return.count} episodes of {final.episode_steps} agent steps"
+    levels = run.return_levels(final.episode_steps)
+    against = episodes if levels is None else f"random {number(levels[0])}, expert {number(levels[1])}"
+    tiles = []
+    if final.scaled_return is not None:
+        scaled = final.scaled_return
+        tiles.append(Tile("Scaled return", f"{scaled.mean:.2f}", f"{_interval(scaled)}{episodes}"))
+    tiles.append(Tile("Return", number(final.environment_return.mean), against))
+    return tiles
+
+
+def _interval(summary: Summary) -> str:
+    if summary.interval is None:
+        return ""
+    low, high = summary.interval
+    return f"95% interval {low:.2f} to {high:.2f}, "
+
+
+def _curve_cards(looks: Sequence[RunLook]) -> list[Card]:
+    alone = len(looks) == 1
+    band = "Line: mean of the episodes; band: 95% bootstrap interval" + (
+        "; dots: single episodes. " if alone else ". "
+    )
+    return [
+        *_card(
+            "Scaled return",
+            plots.return_curves(looks, scaled=True),
+            f"{band}0 is random, 1 the expert. Healthy: climbs toward 1 and stays there.",
+        ),
+        *_card(
+            "Return",
+            plots.return_curves(looks, scaled=False),
+            f"{band}The environment's own reward; only the method environment learns from it. Healthy: rises.",
+        ),
+        *_card(
+            "Scaled return by wall-clock time",
+            plots.return_curves(looks, scaled=True, by_time=True),
+            "As the first curve, by time, alignment included: for comparing methods at equal cost.",
+        ),
+        *_card(
+            "Learned reward",
+            plots.learned_reward_curves(looks),
+            "What the agent earned per step of its training episodes. Healthy: rises together with the return; rising "
+            "alone, it is being tricked.",
+        ),
+    ]
+
+
+def _loss_cards(looks: Sequence[RunLook]) -> list[Card]:
+    return [
+        card
+        for name, (title, caption) in LOSSES.items()
+        for card in _card(title, plots.loss_curves(looks, name), caption)
+    ]
+
+
+def _ranking_cards(run: RunFiles) -> list[Card]:
+    moments = run.ranking_moments()
+    chosen = list(dict.fromkeys([*list(moments)[:1], *list(moments)[-1:]]))
+    cards = []
+    for agent_steps in chosen:
+        scores = scores_or_none(moments[agent_steps])
+        when = "Right after alignment" if agent_steps == 0 else f"After {thousands(agent_steps)} agent steps"
+        numbers = (
+            ""
+            if scores is None
+            else f"Kendall's τ {scores.kendall_tau:.2f} (a perfect order gives {scores.perfect_tau:.2f}); "
+            f"AUC expert over half-good {scores.expert_above_half_good:.2f}, "
+            f"half-good over random {scores.half_good_above_random:.2f}; "
+            f"margins {scores.expert_margin:.1f} and {scores.half_good_margin:.1f} standard deviations. "
+        )
+        cards += _card(
+            when,
+            plots.ranking_plot(moments[agent_steps]),
+            f"{numbers}A dot is one video the reward model never trained on. Healthy: expert right of half-good, "
+            "half-good right of random.",
+        )
+    return cards
+
+
+def _other_cards(looks: Sequence[RunLook]) -> list[Card]:
+    shown = {"episode/learned_reward", *LOSSES}
+    cards = []
+    for phase, name in sorted(looks[0].run.curves):
+        if name not in shown:
+            unit = COUNTERS[phase].replace("_", " ") + ("" if COUNTERS[phase].endswith("s") else "s")
+            caption = f"{phase.title()} Phase, over {unit}; band: the middle 80% of nearby values."
+            cards += _card(name, plots.metric_curves(looks, phase, name), caption)
+    return cards
+
+
+def _strip_cards(run: RunFiles) -> list[Card]:
+    cards = []
+    for start in run.starts()[:SHOWN_STARTS]:
+        videos = videos_of_start(run, start)
+        if videos:
+            cards += _card(
+                f"Start {start + 1}",
+                reward_above_film_strip(videos),
+                "Each picture stands below its moment on the curve. Healthy: the expert's reward stays above random's, "
+                "and the agent's curve and pictures follow the expert's.",
+            )
+    return cards
+
+
+def _card(title: str, figure: Figure | None, caption: str) -> list[Card]:
+    """One card, or none where there was nothing to draw."""
+    return [] if figure is None else [Card(title, svg_data_uri(figure), caption)]
+
+
+def _video_rows(run: RunFiles) -> list[list[PlayedVideo]]:
+    rows = []
+    for start in sorted({start for _, start in run.video_files})[:SHOWN_STARTS]:
+        row = []
+        for kind in (kind for kind in KINDS if kind != "random"):
+            path = run.video_files.get((kind, start))
+            if path is None:
+                continue
+            shown = run.showcase.get((kind, start))
+            known = shown is not None and shown.environment_return is not None
+            row.append(
+                PlayedVideo(
+                    kind=kind,
+                    color=KIND_COLORS[kind],
+                    source="data:video/mp4;base64," + base64.b64encode(path.read_bytes()).decode("ascii"),
+                    detail=f"return {shown.environment_return:.3g}" if shown is not None and known else "",
+                )
+            )
+        rows.append(row)
+    return [row for row in rows if row]
+
+
+def flattened(config: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """The fields of a nested configuration as rows of dotted name and value."""
+    for name, value in config.items():
+        if isinstance(value, Mapping):
+            yield from flattened(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", str(value)
+
+
+def duration(seconds: float) -> str:
+    """A wall-clock time, short: 45 s, 12 min, 2 h 41 min."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"

@@ -1,0 +1,37 @@
+from pathlib import Path
+
+import pytest
+from synthetic_run import AGENT_STEPS, write_synthetic_run
+
+from bootifol.reports.findings import final_return, findings, number
+from bootifol.reports.run_files import read_run
+
+
+def test_the_long_episodes_speak_for_a_run(shared_run: Path) -> None:
+    final = final_return(read_run(shared_run))
+    assert final is not None
+    assert (final.agent_steps, final.episode_steps, final.successes) == (AGENT_STEPS, 500, 10)
+    assert final.scaled_return is not None
+    assert final.scaled_return.mean == pytest.approx(0.93, abs=0.1)
+
+
+def test_a_good_run_is_told_so(shared_run: Path) -> None:
+    told = findings(read_run(shared_run))
+    assert [finding.verdict for finding in told] == ["good"] * 4
+    assert "its true return rose with it" in told[2].text
+
+
+def test_a_run_that_learned_nothing_is_told_so(tmp_path: Path) -> None:
+    run = read_run(write_synthetic_run(tmp_path / "idle", final=0.0))
+    verdicts = {finding.text.split()[0]: finding.verdict for finding in findings(run)}
+    assert verdicts["The"] in ("good", "fair")  # the last sentence that begins so is about the reward
+    assert verdicts["Per"] == "poor"
+    assert verdicts["From"] == "poor"
+    assert findings(run)[0].verdict == "poor"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(386.2, "386"), (9.1667, "9.17"), (-0.7214, "−0.721"), (4223.7, "4224"), (0.0, "0")]
+)
+def test_numbers_are_short(value: float, text: str) -> None:
+    assert number(value) == text

@@ -1,0 +1,168 @@
+import base64
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from synthetic_run import write_synthetic_run
+
+from bootifol.cli.report import report as report_command
+from bootifol.errors import BootifolError
+from bootifol.reports.html import duration, flattened, report
+
+
+class Page(HTMLParser):
+    """Collects what a page would load, its text, and whether its tags are balanced."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.source = path.read_text()
+        self.loaded: list[tuple[str, str]] = []
+        self.words: list[str] = []
+        self.open: list[str] = []
+        self.feed(self.source)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.loaded += [
+            (tag, value or "") for name, value in attrs if name in ("src", "href", "srcset", "poster")
+        ]
+        if tag not in ("meta", "img", "link", "br"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+
+@pytest.fixture(scope="module")
+def page(shared_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Page:
+    return Page(report([shared_run], tmp_path_factory.mktemp("out") / "report.html"))
+
+
+def svgs(page: Page) -> list[str]:
+    prefix = "data:image/svg+xml;base64,"
+    return [base64.b64decode(url[len(prefix) :]).decode() for _, url in page.loaded if url.startswith(prefix)]
+
+
+def test_the_page_loads_nothing_from_outside(page: Page) -> None:
+    assert page.loaded
+    assert all(url.startswith(("data:", "#")) for _, url in page.loaded)
+    assert not re.search(r"url\(|@import", page.source)
+    assert not page.open
+    for svg in svgs(page):
+        assert not re.search(r'href="(?!data:|#)', svg)
+
+
+def test_videos_of_expert_and_agent_are_embedded_whole(page: Page, shared_run: Path) -> None:
+    videos = [url for tag, url in page.loaded if tag == "video"]
+    assert len(videos) == 6
+    for url, name in zip(videos, ("expert-0", "agent-0", "expert-1"), strict=False):
+        payload = base64.b64decode(url.removeprefix("data:video/mp4;base64,"))
+        assert payload == (shared_run / "videos" / f"{name}.mp4").read_bytes()
+    assert page.source.count("autoplay muted loop controls") == 6
+
+
+def test_the_page_says_what_the_issue_asks_for(page: Page) -> None:
+    for expected in (
+        "Reacher Hard",
+        "Scaled return",
+        "95% interval",
+        "60,000 actions",
+        "2 h 20 min",
+        "Kendall's τ",
+        "L_S: two views agree",
+        "L_triplet",
+        "L_ae",
+        "L_Z",
+        "L_O",
+        "Learned reward",
+        "bootifol train --task reacher_hard",
+        "bootifol report",
+        "torch 2.13.0",
+        "reward.weights.triplet",
+    ):
+        assert expected in page.text, expected
+    assert page.text.count("Healthy:") >= 12
+
+
+def test_every_loss_is_drawn_in_both_phases(page: Page) -> None:
+    both = [svg for svg in svgs(page) if "Alignment Phase" in svg and "Interactive Phase" in svg]
+    assert len(both) == 6
+
+
+def test_a_name_cannot_inject_markup(run_dir: Path, tmp_path: Path) -> None:
+    config = run_dir / "config.json"
+    config.write_text(config.read_text().replace("demos/reacher_hard", "<script>alert(1)</script>"))
+    assert "<script>alert" not in report([run_dir], tmp_path / "report.html").read_text()
+
+
+def test_several_runs_are_compared(shared_run: Path, tmp_path: Path) -> None:
+    other = write_synthetic_run(tmp_path / "upper-1", method="environment", final=1.0)
+    page = Page(report([shared_run, other], tmp_path / "both.html"))
+    assert "2 runs side by side" in page.text
+    compared = [svg for svg in svgs(page) if "bootifol, seed 1" in svg and "environment, seed 1" in svg]
+    assert len(compared) == 10  # four curves and six losses
+    assert [url for tag, url in page.loaded if tag == "a"] == ["#run-0", "#run-1"]
+
+
+def test_a_run_with_nothing_but_its_configuration_has_a_report(run_dir: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "bare"
+    bare.mkdir()
+    (bare / "config.json").write_bytes((run_dir / "config.json").read_bytes())
+    page = Page(report([bare], tmp_path / "report.html"))
+    assert "Not in this report" in page.text
+    assert "metrics.jsonl is missing" in page.text
+
+
+def test_damage_is_told_and_the_rest_is_shown(run_dir: Path, tmp_path: Path) -> None:
+    (run_dir / "ranking.csv").unlink()
+    (run_dir / "showcase.safetensors").write_bytes(b"\x00" * 20)
+    (run_dir / "videos" / "agent-0.mp4").write_bytes(b"")
+    page = Page(report([run_dir], tmp_path / "report.html"))
+    for note in (
+        "ranking.csv is missing",
+        "showcase.safetensors was left out",
+        "videos/agent-0.mp4 is empty",
+    ):
+        assert note in page.text
+    assert "Learning curves" in page.text
+    assert len([tag for tag, _ in page.loaded if tag == "video"]) == 5
+
+
+def test_no_run_is_a_sentence_and_leaves_the_old_report(tmp_path: Path) -> None:
+    out = tmp_path / "report.html"
+    out.write_text("old")
+    with pytest.raises(BootifolError, match="name the directory"):
+        report([], out)
+    with pytest.raises(BootifolError, match="there is no run directory"):
+        report([tmp_path / "nowhere"], out)
+    assert out.read_text() == "old"
+
+
+def test_the_command_writes_into_the_run_and_says_where(
+    run_dir: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert report_command([run_dir]) == 0
+    assert (run_dir / "report.html").exists()
+    assert str(run_dir / "report.html") in capsys.readouterr().out
+
+
+def test_nested_configurations_are_flattened() -> None:
+    assert list(flattened({"a": {"b": 1, "c": {"d": None}}, "e": [1, 2]})) == [
+        ("a.b", "1"),
+        ("a.c.d", "None"),
+        ("e", "[1, 2]"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(45, "45 s"), (600, "10 min"), (3599, "1 h 00 min"), (9700, "2 h 42 min")]
+)
+def test_durations_are_short(seconds: float, text: str) -> None:
+    assert duration(seconds) == text

@@ -1,0 +1,115 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from bootifol.errors import BootifolError
+from bootifol.reports import plots
+from bootifol.reports.film_strip import reward_above_film_strip, save_readme_picture, videos_of_start
+from bootifol.reports.run_files import Curve, RunFiles, read_run
+
+
+@pytest.fixture(scope="module")
+def run(shared_run: Path) -> RunFiles:
+    return read_run(shared_run)
+
+
+def test_runs_differ_by_method_color_and_seed_dashes(run: RunFiles) -> None:
+    other_seed, other_method = replace(run, seed=2), replace(run, method="environment")
+    first, second, third = plots.looks_of([run, other_seed, other_method])
+    assert first.color == second.color != third.color
+    assert first.dashes != second.dashes
+    assert [look.label for look in (first, third)] == ["bootifol, seed 1", "environment, seed 1"]
+
+
+def test_variants_of_one_method_and_seed_are_told_apart_by_directory(run: RunFiles) -> None:
+    first, second = plots.looks_of([run, replace(run, path=Path("runs/soft-minimum"))])
+    assert first.color != second.color
+    assert second.label == "soft-minimum"
+
+
+def test_more_runs_than_colors_still_differ(run: RunFiles) -> None:
+    looks = plots.looks_of([replace(run, path=Path(f"runs/{i}")) for i in range(10)])
+    assert len({(look.color, str(look.dashes)) for look in looks}) == 10
+
+
+def test_a_curve_shows_the_mean_of_the_episodes(run: RunFiles) -> None:
+    figure = plots.return_curves(plots.looks_of([run]), scaled=True)
+    assert figure is not None
+    drawn = np.asarray(figure.axes[0].lines[0].get_xydata())
+    steps, rows = list(run.evaluations_of(60).items())[7]
+    assert drawn[7] == pytest.approx((steps, np.mean([row.scaled_return for row in rows])))
+
+
+def test_nothing_to_draw_gives_no_figure(run: RunFiles) -> None:
+    looks = plots.looks_of([replace(run, evaluations=[], curves={})])
+    assert plots.return_curves(looks, scaled=True) is None
+    assert plots.learned_reward_curves(looks) is None
+    assert plots.loss_curves(looks, "loss/sequence") is None
+
+
+def test_one_evaluation_without_scale_is_drawn(run: RunFiles) -> None:
+    row = replace(run.evaluations[0], scaled_return=None)
+    looks = plots.looks_of([replace(run, evaluations=[row])])
+    assert plots.return_curves(looks, scaled=False) is not None
+    assert plots.return_curves(looks, scaled=True) is None
+
+
+def test_long_curves_are_binned(run: RunFiles) -> None:
+    curve = Curve(np.arange(100_000.0), np.ones(100_000))
+    figure = plots.loss_curves(
+        plots.looks_of([replace(run, curves={("alignment", "loss/total"): curve})]), "loss/total"
+    )
+    assert figure is not None
+    line = np.asarray(figure.axes[0].lines[0].get_xydata())
+    assert len(line) == 100
+    assert np.all(line[:, 1] == 1.0)
+
+
+def test_kinds_have_one_color_everywhere(run: RunFiles) -> None:
+    figure = plots.ranking_plot(run.ranking_moments()[0])
+    strip = reward_above_film_strip(videos_of_start(run, 0))
+    assert figure.axes[0].lines[0].get_color() == plots.KIND_COLORS["random"]
+    colors = {line.get_label(): line.get_color() for line in strip.axes[0].lines}
+    assert colors == {kind: plots.KIND_COLORS[kind] for kind in ("expert", "agent", "random")}
+
+
+def test_pictures_stand_at_their_time(run: RunFiles) -> None:
+    videos = videos_of_start(run, 0)
+    strip = reward_above_film_strip(videos).axes[1]
+    picture = strip.images[4]
+    left, right, _, _ = picture.get_extent()
+    moment = int((left + right) / 2)
+    assert left <= moment <= right
+    shown = [np.array_equal(np.asarray(picture.get_array()), frame) for frame in videos["expert"].frames]
+    assert shown[27]
+    assert left <= 27 <= right
+
+
+def test_the_same_figure_gives_the_same_bytes(run: RunFiles) -> None:
+    looks = plots.looks_of([run])
+    first, second = (plots.return_curves(looks, scaled=True) for _ in range(2))
+    assert first is not None
+    assert second is not None
+    assert plots.svg_data_uri(first) == plots.svg_data_uri(second)
+
+
+def test_the_picture_for_the_readme(shared_run: Path, tmp_path: Path) -> None:
+    save_readme_picture(shared_run, tmp_path / "docs" / "result.png")
+    with Image.open(tmp_path / "docs" / "result.png") as picture:
+        assert picture.width == 1560
+        colors = picture.convert("RGB").getcolors(maxcolors=1 << 22)
+    assert len(colors) > 100
+
+
+def test_a_run_without_showcase_has_no_picture(run_dir: Path, tmp_path: Path) -> None:
+    (run_dir / "showcase.safetensors").unlink()
+    with pytest.raises(BootifolError, match="has no showcase"):
+        save_readme_picture(run_dir, tmp_path / "result.png")
+
+
+@pytest.mark.parametrize(("value", "text"), [(950, "950"), (12_000, "12K"), (1_550_000, "1.55M"), (0, "0")])
+def test_counts_are_short(value: float, text: str) -> None:
+    assert plots.thousands(value) == text
