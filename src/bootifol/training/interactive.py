@@ -50,6 +50,10 @@ class InteractivePhase:
         self.averages = Averages()
         self._watch = Stopwatch()
 
+    def start_clock(self) -> None:
+        """Counts wall-clock time from here on."""
+        self._watch = Stopwatch()
+
     def play_episode(self) -> None:
         """One turn of the outer loop: act and learn for an episode, then reward it and store it."""
         references = draw_references(self.reward_model, self.expert, self.rng)

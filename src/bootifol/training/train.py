@@ -151,6 +151,7 @@ class Run:
 
     def _interact(self, interruption: Interruption) -> bool:
         config = self.run.training
+        self.interactive.start_clock()
         next_log = self.counters.agent_steps + config.interactive.log_every
         with progress(
             "agent steps", config.interactive.agent_steps, self.budget.scheduled_steps(self.counters)

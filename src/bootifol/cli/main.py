@@ -1,0 +1,102 @@
+"""The `bootifol` command: one thin module a subcommand; errors are one sentence and exit code 2."""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import tyro
+from rich.console import Console
+
+from bootifol.errors import BootifolError
+
+DESCRIPTION = """Videos in, policy out: learns a reward from videos of a task, and trains a pixel policy on it.
+
+A first tour:
+  bootifol doctor                                                     can this machine do it
+  bootifol demos record --task reacher_hard --out demos/reacher_hard  expert videos to learn from
+  bootifol train --demos demos/reacher_hard --out runs/first          a policy
+  bootifol report runs/first                                          what it learned
+"""
+
+DEMOS_DESCRIPTION = "Make, import and check sets of videos to learn from."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command.
+
+    Args:
+        arguments: without the program's name; the process's own by default.
+
+    Returns:
+        The exit code: 0, or 2 after bad input, which one sentence explains.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        if words[:1] == ["demos"]:
+            return _run(_demos_commands(), words[1:], "bootifol demos", DEMOS_DESCRIPTION)
+        return _run(_commands(words), words, "bootifol", DESCRIPTION)
+    except BootifolError as error:
+        Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {_escaped(str(error))}")
+        return 2
+    except KeyboardInterrupt:
+        Console(stderr=True).print("stopped")
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has gone, as `| head` does.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _run(commands: dict[str, Callable[..., int]], words: list[str], prog: str, description: str) -> int:
+    code: int = tyro.extras.subcommand_cli_from_dict(
+        commands,
+        prog=prog,
+        description=description,
+        args=words or ["--help"],
+        config=(tyro.conf.FlagConversionOff, tyro.conf.AvoidSubcommands),
+    )
+    return code
+
+
+def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
+    from bootifol.cli.doctor import doctor
+    from bootifol.cli.evaluate import evaluate
+    from bootifol.cli.report import report
+    from bootifol.cli.score import score
+    from bootifol.cli.tasks import tasks
+    from bootifol.cli.train import preset_of, train
+
+    return {
+        "doctor": doctor,
+        "tasks": tasks,
+        "demos": _demos_placeholder,
+        "train": _with_default(train, config=preset_of(words)),
+        "evaluate": evaluate,
+        "score": score,
+        "report": report,
+    }
+
+
+def _demos_commands() -> dict[str, Callable[..., int]]:
+    from bootifol.cli.demos import check, import_, record
+
+    return {"record": record, "import": import_, "check": check}
+
+
+def _demos_placeholder() -> int:
+    """Make, import and check sets of videos to learn from: demos record, demos import, demos check."""
+    return main(["demos", "--help"])
+
+
+def _with_default(function: Callable[..., int], **defaults: Any) -> Callable[..., int]:
+    partial = functools.partial(function, **defaults)
+    functools.update_wrapper(partial, function)
+    return partial
+
+
+def _escaped(text: str) -> str:
+    return text.replace("[", r"\[")

@@ -1,0 +1,74 @@
+"""`bootifol train`: videos in, policy out."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from bootifol.errors import BootifolError
+from bootifol.presets import PresetName, preset
+from bootifol.training.config import TrainingConfig
+
+
+def preset_of(words: list[str]) -> TrainingConfig:
+    """The configuration whose values are the defaults of `train`'s flags, from the `--preset` among `words`."""
+    for index, word in enumerate(words):
+        name, _, value = word.partition("=")
+        if name == "--preset":
+            return preset(value or (words[index + 1] if index + 1 < len(words) else ""))
+    return preset("cpu")
+
+
+def train(
+    config: Annotated[TrainingConfig, tyro.conf.arg(name="")],
+    task: str = "reacher_hard",
+    method: Literal["bootifol", "environment"] = "bootifol",
+    preset: PresetName = "cpu",
+    demos: Path | None = None,
+    out: Path | None = None,
+    seed: int = 1,
+    time_budget: str | None = None,
+    resume: Path | None = None,
+) -> int:
+    """Learn a reward from videos and train a policy on it, or go on with an interrupted run.
+
+    Args:
+        config: Every setting of the preset, which the flags below change one by one.
+        task: The environment to act in; `bootifol tasks` lists them.
+        method: bootifol learns its reward from the videos; environment uses the true reward, as an upper bound.
+        preset: paper: its hyperparameters to the digit. cpu: 2 cores, within 3 hours. smoke: every stage in under
+            two minutes.
+        demos: Directory of the videos, from `bootifol demos record` or `bootifol demos import`.
+        out: Directory to write the run to, such as runs/first.
+        seed: Of everything random.
+        time_budget: Wall-clock time for learning, such as 90s, 45m or 1h30m; schedules are stretched to fit it.
+            The final evaluation and the report come after it.
+        resume: Directory of an interrupted run to go on with; its own configuration is used.
+    """
+    # Imported here: help should not wait for PyTorch.
+    from bootifol.training.api import continue_run, train_policy
+    from bootifol.training.budget import parse_duration
+
+    if resume is not None:
+        continue_run(resume)
+        return 0
+    if demos is None or out is None:
+        raise BootifolError(
+            "train needs --demos (the videos) and --out (where to write the run), or --resume RUN to go on; record "
+            f"videos with `bootifol demos record --task {task} --out demos/{task}`"
+        )
+    train_policy(
+        task,
+        demos,
+        out,
+        method=method,
+        preset=preset,
+        seed=seed,
+        time_budget=None if time_budget is None else parse_duration(time_budget),
+        config=config,
+        command=["bootifol", *sys.argv[1:]],
+    )
+    return 0

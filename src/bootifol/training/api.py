@@ -1,0 +1,183 @@
+"""What the command line does, as functions: train, go on, evaluate, score."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.manifest import MANIFEST_NAME
+from bootifol.demos.video_files import read_video
+from bootifol.envs.pictures import resize
+from bootifol.errors import BootifolError
+from bootifol.evaluation.ranking import draw_references
+from bootifol.evaluation.returns import EpisodeResult, scaled_return
+from bootifol.evaluation.returns import evaluate as evaluate_act
+from bootifol.evaluation.summary import Summary, summarize
+from bootifol.files import written_aside
+from bootifol.presets import preset as preset_named
+from bootifol.reports.html import report
+from bootifol.tasks import task_named
+from bootifol.training.checkpoint import load_checkpoint, newest_checkpoint
+from bootifol.training.components import (
+    build_agent,
+    build_environment,
+    build_reward_model,
+    open_demos,
+    reference_rng,
+)
+from bootifol.training.config import TrainingConfig
+from bootifol.training.interactive import evaluation_seeds
+from bootifol.training.run_config import RunConfig
+from bootifol.training.train import Run, start_run
+from bootifol.types import Rewards, Video
+
+
+def train_policy(
+    task: str,
+    demos: Path | str,
+    out: Path | str,
+    *,
+    method: str = "bootifol",
+    preset: str = "cpu",
+    seed: int = 1,
+    time_budget: float | None = None,
+    config: TrainingConfig | None = None,
+    command: Sequence[str] = (),
+) -> Path:
+    """Learns a reward from videos and trains a policy on it; writes the run's directory and its report.
+
+    Args:
+        task: from the catalogue.
+        demos: directory of the videos.
+        out: directory of the run, new or empty.
+        method: bootifol, or environment for the upper bound.
+        preset: paper, cpu or smoke.
+        seed: of everything random.
+        time_budget: seconds of wall-clock time for learning; None for the configuration's agent steps.
+        config: instead of the preset's.
+        command: what the user typed, for the report.
+
+    Returns:
+        The run's directory.
+
+    Raises:
+        BootifolError: bad input, or an error that the run can be resumed from, which its sentence says.
+    """
+    task_named(task)
+    run = RunConfig(
+        task=task,
+        method=method,
+        preset=preset,
+        seed=seed,
+        demos=str(demos),
+        time_budget=time_budget,
+        training=config or preset_named(preset),
+    )
+    directory = start_run(run, Path(out), list(command))
+    continue_run(directory)
+    return directory
+
+
+def continue_run(directory: Path | str) -> bool:
+    """Goes on with a run from its newest checkpoint, to its end, its final evaluation and its report.
+
+    Returns:
+        False if it was asked to stop before its end.
+    """
+    console = Console(stderr=True)
+    run = Run(Path(directory), console)
+    if not run.learn():
+        return False
+    run.finish()
+    target = report([Path(directory)], Path(directory) / "report.html")
+    console.print(f"report: {target}")
+    return True
+
+
+@dataclass(frozen=True)
+class RunEvaluation:
+    """Returns of a run's newest policy."""
+
+    episodes: list[EpisodeResult]
+    summary: Summary
+    """Of the environment's returns."""
+    scaled_return: float
+    """0 for random actions, 1 for the expert."""
+    episode_steps: int
+
+
+def evaluate_run(directory: Path | str, episodes: int = 10, seed: int = 1000) -> RunEvaluation:
+    """Plays a run's newest policy, without exploration, in episodes of the task's evaluation length."""
+    run = RunConfig.read(Path(directory))
+    task = task_named(run.task)
+    environment = build_environment(run, task.evaluation_steps)
+    agent = build_agent(run, environment)
+    load_checkpoint(_newest(Path(directory)), {"agent": agent})
+    results = evaluate_act(
+        environment,
+        lambda observation: agent.act(observation, run.training.interactive.agent_steps, explore=False),
+        evaluation_seeds(seed, episodes),
+    )
+    environment.close()
+    summary = summarize([result.environment_return for result in results])
+    scaled = scaled_return(summary.mean, expert_return=task.expert_return, random_return=task.random_return)
+    return RunEvaluation(results, summary, scaled, task.evaluation_steps)
+
+
+def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[str, Rewards]:
+    """The learned reward along videos, each compared with the same expert videos.
+
+    Args:
+        directory: of the run.
+        videos: video files, folders of frames, .npy files or demo sets.
+
+    Returns:
+        Rewards `[T]` by the video's name. A video longer than the expert's is scored as far as theirs reach.
+    """
+    run = RunConfig.read(Path(directory))
+    model = build_reward_model(run)
+    if model.reads_environment_reward:
+        raise BootifolError(
+            f"{directory} was trained on the environment's reward: it has no reward for videos"
+        )
+    load_checkpoint(_newest(Path(directory)), {"reward_model": model})
+    expert = open_demos(run, Console(stderr=True)).expert
+    references = draw_references(model, expert, reference_rng(run.seed, 0))
+    length = min(len(reference.frames) for reference in references)
+    size = run.training.pictures.video_size
+    scores: dict[str, Rewards] = {}
+    for path in map(Path, videos):
+        for video in _read_videos(path, size):
+            shortened = Video(video.name, video.frames[:length])
+            scores[video.name] = model.label(shortened, references)
+    return scores
+
+
+def write_scores(path: Path, scores: dict[str, Rewards]) -> None:
+    """Writes `score_videos`' result as CSV with the columns video, step, reward."""
+    with written_aside(path) as aside, aside.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["video", "step", "reward"])
+        for name, rewards in scores.items():
+            writer.writerows([name, step, f"{reward:.6g}"] for step, reward in enumerate(rewards))
+
+
+def _read_videos(path: Path, size: int) -> list[Video]:
+    if (path / MANIFEST_NAME).is_file():
+        demo_set = DemoSet.open(path)
+        return [demo_set[index] for index in range(len(demo_set))]
+    frames = read_video(path)
+    return [Video(str(path), np.stack([resize(frame, size) for frame in frames]))]
+
+
+def _newest(directory: Path) -> Path:
+    checkpoint = newest_checkpoint(directory / "checkpoints")
+    if checkpoint is None:
+        raise BootifolError(f"{directory} has no checkpoint yet: let `bootifol train` write one first")
+    return checkpoint
