@@ -203,7 +203,7 @@ class DrQv2:
                 uniform = torch.rand(shape, generator=self._generator, device=self._device)
                 return _to_numpy(uniform * 2 - 1)
             picture = torch.from_numpy(observation).to(self._device).permute(2, 0, 1).unsqueeze(0)
-            mean = self.actor(self.encoder(_scaled(picture, torch.float32)))
+            mean = self.actor(self.encoder(picture.float()))
             if explore:
                 mean = noisy_action(mean, self.config.exploration(agent_steps), None, self._generator)
             return _to_numpy(mean[0])
@@ -306,7 +306,7 @@ class DrQv2:
 
     def _network_input(self, observation: Tensor) -> Tensor:
         dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32
-        return _scaled(observation.to(self._device), dtype)
+        return observation.to(self._device, dtype)
 
     def _autocast(self) -> torch.autocast:
         return torch.autocast(self._device.type, torch.bfloat16, enabled=self.config.precision == "bf16")
@@ -330,11 +330,6 @@ def _to_channels_last(network: nn.Module) -> None:
     for parameter in network.parameters():
         if parameter.dim() == 4:
             parameter.data = parameter.data.to(memory_format=torch.channels_last)
-
-
-def _scaled(observation: Tensor, dtype: torch.dtype) -> Tensor:
-    """Uint8 pixels to [-0.5, 0.5]; 127.5 is subtracted first because bfloat16 does that exactly."""
-    return observation.to(dtype, memory_format=torch.channels_last).sub_(127.5).mul_(1 / 255)
 
 
 def _to_numpy(action: Tensor) -> Action:
