@@ -28,7 +28,7 @@ class PictureConfig:
     """Newest frames in one observation of the agent."""
 
     profile: RenderProfile = "fast"
-    """fast: no shadows, reflections or anti-aliasing, about a tenth of the time. balanced: small shadow map, no
+    """fast: no shadows, reflections or sky, about a tenth of the time of full. balanced: a small shadow map, no
     anti-aliasing. full: the simulator's own quality. Videos and environment must agree."""
 
     def __post_init__(self) -> None:

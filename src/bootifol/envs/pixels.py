@@ -17,6 +17,9 @@ class Simulator(Protocol):
 
     action_dim: int
 
+    step_seconds: float
+    """Simulated time of one simulator step."""
+
     def reset(self, seed: int) -> None:
         """Draws a start from `seed` alone."""
         ...
@@ -52,6 +55,10 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
         self.pictures = pictures
         self.action_repeat = action_repeat
         self.episode_steps = episode_steps
+        self.metadata = {
+            "render_modes": [],
+            "render_fps": round(1.0 / (action_repeat * simulator.step_seconds), 6),
+        }
         size = pictures.agent_size
         self.observation_space = gymnasium.spaces.Box(0, 255, (size, size, 3 * pictures.stack), np.uint8)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (simulator.action_dim,), np.float32)
@@ -75,9 +82,12 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
 
         Raises:
             RuntimeError: the episode is over, or was never started.
+            ValueError: the action has another shape than `[A]`, or is not finite.
         """
         if self._over:
             raise RuntimeError("the episode is over: call reset before step")
+        if np.shape(action) != self.action_space.shape or not np.isfinite(action).all():
+            raise ValueError(f"an action here is {self.action_space.shape} finite numbers, not {action}")
         reward, terminated, success = 0.0, False, None
         clipped = np.clip(action, -1.0, 1.0)
         for _ in range(self.action_repeat):
@@ -106,4 +116,6 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
         }
 
     def _observation(self) -> Observation:
-        return np.concatenate(self._frames, axis=2)
+        # Whole pixels are moved instead of single bytes, in half the time.
+        pixels = np.concatenate([frame.view("V3") for frame in self._frames], axis=2)
+        return pixels.view(np.uint8)

@@ -44,11 +44,15 @@ class HalfGood:
         self._rng = np.random.default_rng([seed, 3])
         self._action_dim = environment.action_space.shape[0]  # type: ignore[index]
         self._kind = int(self._rng.integers(3 if wrong_goal else 2))
-        self._goal = wrong_goal(self._rng) if wrong_goal else None
+        self._wrong_goal = wrong_goal
+        self._goal: NDArray[np.float64] | None = None
         self._step = 0
 
     def __call__(self, observation: Observation) -> Action:
         """One action; the observation is not needed."""
+        if self._step == 0 and self._wrong_goal:
+            # Only now does the simulator show this episode's start.
+            self._goal = self._wrong_goal(self._rng)
         self._step += 1
         noise = self._rng.uniform(-1.0, 1.0, self._action_dim).astype(np.float32)
         if self._kind == 0:

@@ -1,0 +1,173 @@
+"""`bootifol doctor`: what this machine can do."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import statistics
+import time
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+from typing import get_args
+
+from rich.console import Console
+from rich.table import Table
+
+from bootifol.envs.pictures import RenderProfile
+from bootifol.errors import BootifolError
+
+_TASK = "reacher_hard"
+_PICTURE_SIZE = 64
+_STEPS = 12
+_MATRIX_SIZE = 512
+
+
+def doctor() -> int:
+    """Say whether this machine can train: versions, cores, memory, speed of bf16, and of rendering.
+
+    Exits with 0 when it can, and with 2 and what to install when something is missing.
+    """
+    console = Console()
+    versions, missing = installed()
+    table = Table("package", "version", "needed", title="Versions", title_justify="left")
+    table.add_row("python", platform.python_version(), ">=3.11")
+    for name, (version, needed) in versions.items():
+        table.add_row(name, version or "[bold red]missing[/]", needed)
+    console.print(table)
+    if missing:
+        raise BootifolError(
+            f"packages are missing: {', '.join(missing)}; type `pip install "
+            + " ".join(f"'{name}{versions[name][1]}'" for name in missing)
+            + "`"
+        )
+
+    table = Table("what", "measured", title="Machine", title_justify="left")
+    for what, measured in machine():
+        table.add_row(what, measured)
+    console.print(table)
+
+    table = Table(
+        "render profile",
+        "ms an agent step",
+        "what it draws",
+        title=f"Pictures of {_TASK}, {_PICTURE_SIZE}×{_PICTURE_SIZE}",
+        title_justify="left",
+    )
+    for profile in get_args(RenderProfile):
+        table.add_row(profile, f"{milliseconds_per_step(profile):.1f}", _DRAWN[profile])
+    console.print(table)
+    console.print("this machine can record videos and train")
+    return 0
+
+
+_DRAWN: dict[RenderProfile, str] = {
+    "fast": "no shadows, no reflections; smoothed by averaging",
+    "balanced": "coarse shadows",
+    "full": "all that the simulator offers",
+}
+
+
+def installed() -> tuple[dict[str, tuple[str | None, str]], list[str]]:
+    """The packages that bootifol needs.
+
+    Returns:
+        By name, the version (None where missing) and what is needed, such as ">=3.3"; and the missing names.
+    """
+    versions: dict[str, tuple[str | None, str]] = {"bootifol": (metadata.version("bootifol"), "")}
+    for requirement in metadata.requires("bootifol") or []:
+        if "extra ==" in requirement:
+            continue
+        match = re.match(r"([\w.-]+)\s*([^;]*)", requirement)
+        assert match is not None, requirement
+        name, needed = match[1], match[2].strip()
+        try:
+            versions[name] = (metadata.version(name), needed)
+        except metadata.PackageNotFoundError:
+            versions[name] = (None, needed)
+    return versions, [name for name, (version, _) in versions.items() if version is None]
+
+
+def machine() -> list[tuple[str, str]]:
+    """Rows about cores, memory and arithmetic."""
+    import torch
+
+    rows = [("cores", f"{_cores()} ({torch.get_num_threads()} used by PyTorch)")]
+    memory = _memory_bytes()
+    if memory is not None:
+        rows.append(("memory", f"{memory / 2**30:.1f} GB"))
+    if torch.cuda.is_available():
+        rows.append(("GPU", torch.cuda.get_device_name()))
+    ratio = bf16_speed()
+    advice = "worth using" if ratio > 1.2 else "no gain: keep precision at fp32"
+    rows.append(("bf16 against fp32", f"matrix products {ratio:.1f} times as fast ({advice})"))
+    return rows
+
+
+def bf16_speed() -> float:
+    """How many times as fast as in fp32 a matrix product is in bf16, on the CPU."""
+    import torch
+
+    fp32 = torch.randn(_MATRIX_SIZE, _MATRIX_SIZE)
+    bf16 = fp32.to(torch.bfloat16)
+    return _seconds(lambda: fp32 @ fp32) / _seconds(lambda: bf16 @ bf16)
+
+
+def milliseconds_per_step(profile: RenderProfile) -> float:
+    """Median time of an agent step with its picture.
+
+    Raises:
+        BootifolError: pictures cannot be rendered here.
+    """
+    import numpy as np
+
+    from bootifol.envs.pictures import PictureConfig
+    from bootifol.experts import make_random
+    from bootifol.tasks import make_environment
+
+    pictures = PictureConfig(agent_size=_PICTURE_SIZE, video_size=_PICTURE_SIZE, profile=profile)
+    environment = make_environment(_TASK, pictures, _STEPS)
+    act = make_random(environment, seed=0)
+    observation, _ = environment.reset(seed=0)
+    times = []
+    for _ in range(_STEPS):
+        started = time.perf_counter()
+        observation, *_ = environment.step(act(observation))
+        times.append(time.perf_counter() - started)
+    environment.close()
+    if np.ptp(observation) == 0:
+        raise BootifolError(
+            "MuJoCo renders, but every pixel is the same; the OpenGL driver does not work: choose another with the "
+            "environment variable MUJOCO_GL (egl, osmesa or glfw)"
+        )
+    return 1000.0 * statistics.median(times)
+
+
+def _seconds(work: Callable[[], object], repetitions: int = 5) -> float:
+    """The best of a few, after a first one to warm up."""
+    work()
+    times = []
+    for _ in range(repetitions):
+        started = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - started)
+    return min(times)
+
+
+def _cores() -> int:
+    """Those this process may use, where the system says so."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _memory_bytes() -> int | None:
+    """The machine's memory, or the container's limit where that is lower; None where unknown."""
+    if "SC_PHYS_PAGES" not in getattr(os, "sysconf_names", {}):
+        return None
+    total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    limit = Path("/sys/fs/cgroup/memory.max")
+    if limit.is_file() and (text := limit.read_text().strip()).isdigit():
+        total = min(total, int(text))
+    return total

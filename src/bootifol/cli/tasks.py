@@ -1,0 +1,84 @@
+"""`bootifol tasks`: the catalogue."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.table import Table
+
+from bootifol.errors import BootifolError
+from bootifol.tasks import TASKS
+
+
+def tasks(measure: int = 0) -> int:
+    """List the tasks, the lengths of their episodes, and the returns of their expert and of random actions.
+
+    Args:
+        measure: Play this many evaluation episodes (seeds 0, 1, …) of each task's expert and of random actions, and
+            print their mean return, standard deviation and 95% interval.
+    """
+    if measure < 0:
+        raise BootifolError(f"--measure is a number of episodes, not {measure}")
+    catalogue = Table(
+        "task", "suite", "action repeat", "steps", "evaluation steps", "expert return", "random return"
+    )
+    for task in TASKS.values():
+        catalogue.add_row(
+            task.name,
+            task.suite,
+            str(task.action_repeat),
+            str(task.episode_steps),
+            str(task.evaluation_steps),
+            f"{task.expert_return:g}" if task.has_expert else "–",
+            f"{task.random_return:g}",
+        )
+    for column in catalogue.columns[:2]:
+        column.no_wrap = True
+    console = Console()
+    console.print(catalogue)
+    for task in TASKS.values():
+        console.print(f"{task.name}: {task.description}", highlight=False)
+    console.print(
+        "steps: agent steps of a training episode; the returns are means over evaluation episodes",
+        style="dim",
+    )
+    if measure:
+        console.print(_measured(measure))
+    return 0
+
+
+def _measured(episodes: int) -> Table:
+    """Returns of each task's expert and of random actions, played now."""
+    # Imported here: the simulators and scipy would slow down every other command's help.
+    import numpy as np
+
+    from bootifol.envs.pictures import PictureConfig
+    from bootifol.evaluation.returns import evaluate
+    from bootifol.evaluation.summary import summarize
+    from bootifol.experts import Behavior, make_behavior
+    from bootifol.progress import progress
+    from bootifol.tasks import make_environment
+
+    behaviors: tuple[Behavior, ...] = ("expert", "random")
+    # Nobody looks at the pictures, so they are as small as they may be.
+    pictures = PictureConfig(agent_size=8, video_size=8, stack=1)
+    table = Table("task", "who", "episodes", "mean return ± std", "95% interval of the mean")
+    for task in TASKS.values():
+        environment = make_environment(task.name, pictures, task.evaluation_steps)
+        for who in behaviors if task.has_expert else behaviors[1:]:
+            returns: list[float] = []
+            with progress(f"{task.name}, {who}", episodes) as advance:
+                for seed in range(episodes):
+                    act = make_behavior(who, task.name, environment, seed)
+                    [episode] = evaluate(environment, act, [seed])
+                    returns.append(episode.environment_return)
+                    advance(1, mean=float(np.mean(returns)))
+            interval = summarize(returns).interval
+            table.add_row(
+                task.name,
+                who,
+                str(episodes),
+                f"{np.mean(returns):.2f} ± {np.std(returns):.2f}",
+                "–" if interval is None else f"{interval[0]:.2f} … {interval[1]:.2f}",
+            )
+        environment.close()
+    return table
