@@ -96,10 +96,10 @@ def test_every_loss_is_drawn_in_both_phases(page: Page) -> None:
     assert len(both) == 6
 
 
-def test_a_name_cannot_inject_markup(run_dir: Path, tmp_path: Path) -> None:
-    config = run_dir / "config.json"
+def test_a_name_cannot_inject_markup(bare_run: Path, tmp_path: Path) -> None:
+    config = bare_run / "config.json"
     config.write_text(config.read_text().replace("demos/reacher_hard", "<script>alert(1)</script>"))
-    assert "<script>alert" not in report([run_dir], tmp_path / "report.html").read_text()
+    assert "<script>alert" not in report([bare_run], tmp_path / "report.html").read_text()
 
 
 def test_several_runs_are_compared(shared_run: Path, tmp_path: Path) -> None:
@@ -111,11 +111,8 @@ def test_several_runs_are_compared(shared_run: Path, tmp_path: Path) -> None:
     assert [url for tag, url in page.loaded if tag == "a"] == ["#run-0", "#run-1"]
 
 
-def test_a_run_with_nothing_but_its_configuration_has_a_report(run_dir: Path, tmp_path: Path) -> None:
-    bare = tmp_path / "bare"
-    bare.mkdir()
-    (bare / "config.json").write_bytes((run_dir / "config.json").read_bytes())
-    page = Page(report([bare], tmp_path / "report.html"))
+def test_a_run_with_nothing_but_its_configuration_has_a_report(bare_run: Path, tmp_path: Path) -> None:
+    page = Page(report([bare_run], tmp_path / "report.html"))
     assert "Not in this report" in page.text
     assert "metrics.jsonl is missing" in page.text
 
@@ -146,11 +143,11 @@ def test_no_run_is_a_sentence_and_leaves_the_old_report(tmp_path: Path) -> None:
 
 
 def test_the_command_writes_into_the_run_and_says_where(
-    run_dir: Path, capsys: pytest.CaptureFixture[str]
+    bare_run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert report_command([run_dir]) == 0
-    assert (run_dir / "report.html").exists()
-    assert str(run_dir / "report.html") in capsys.readouterr().out
+    assert report_command([bare_run]) == 0
+    assert (bare_run / "report.html").exists()
+    assert str(bare_run / "report.html") in capsys.readouterr().out
 
 
 def test_nested_configurations_are_flattened() -> None:
