@@ -52,6 +52,7 @@ def fitting(write_set: WriteSet) -> Manifest:
     return replace(read_manifest(write_set(moving_videos(1))), frames=31)
 
 
+IMPORTED = {"task": None, "agent_size": None, "render_profile": None, "frames_per_second": 10.0}
 EIGHT = PictureConfig(agent_size=8, video_size=8)
 
 
@@ -73,10 +74,8 @@ def test_fitting_videos_differ_in_nothing(fitting: Manifest) -> None:
         ({"video_size": 16}, "16×16 pixels and the run reads 8×8: pass --pictures.video-size 16"),
         ({"render_profile": "full"}, "pass --pictures.profile full"),
         ({"agent_size": 16}, "rendered at 16 pixels and the run renders at 8"),
-        (
-            {"task": None, "frames": 30, "agent_size": None, "render_profile": None},
-            "import them again with --frames 31",
-        ),
+        (IMPORTED | {"frames": 30}, "import them again with --frames 31"),
+        (IMPORTED | {"frames_per_second": 25.0}, "25 pictures a second and drawn_reach shows 10"),
     ],
 )
 def test_each_difference_comes_with_what_to_do(

@@ -43,6 +43,7 @@ def test_a_recorded_set_has_the_pictures_of_its_episodes(tmp_path: Path) -> None
     manifest = demo_set.manifest
     assert (len(demo_set), manifest.frames, manifest.video_size) == (5, STEPS + 1, 16)
     assert (manifest.task, manifest.behavior, manifest.render_profile) == ("drawn_reach", "expert", "fast")
+    assert (manifest.action_repeat, manifest.frames_per_second) == (1, 10)
     assert [shard.videos for shard in manifest.shards] == [2, 2, 1]
     assert demo_set[4].name == "drawn_reach-expert-000004"
     assert (demo_set[4].frames[0] != demo_set[4].frames[-1]).any()

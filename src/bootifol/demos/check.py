@@ -98,8 +98,8 @@ def _differences_of_imported(manifest: Manifest, task: Task) -> list[str]:
             f"{_too_short(manifest, task)}: import them again with --frames {task.episode_steps + 1}"
         )
     environment = make_environment(task.name, PictureConfig(), task.episode_steps)
-    rate = environment.metadata.get("render_fps")
-    if rate and manifest.frames_per_second and abs(rate - manifest.frames_per_second) > 0.01 * rate:
+    rate = environment.metadata["render_fps"]
+    if manifest.frames_per_second and abs(rate - manifest.frames_per_second) > 0.01 * rate:
         found.append(
             f"the videos show {manifest.frames_per_second:g} pictures a second and {task.name} shows {rate:g}, so "
             f"everything in them looks faster or slower: import them again with --fps {rate:g}"

@@ -139,7 +139,6 @@ def play(plan: Recording, index: int) -> Frames:
     """One video of the set, uint8 `[n, H, W, 3]` with `n` at most T + 1; the same in any process."""
     environment = _environment(plan.task, plan.pictures, plan.episode_steps)
     seed = plan.video_seed(index)
-    environment.reset(seed=seed)  # a half-good performer looks at the start to choose what to do wrong
     act = make_behavior(plan.behavior, plan.task, environment, seed)
     return play_episode(environment, act, seed, name="recorded").episode.video.frames
 
@@ -152,6 +151,7 @@ def _environment(task: str, pictures: PictureConfig, episode_steps: int) -> gymn
 
 def _begin(out: Path, plan: Recording) -> Manifest:
     """The manifest to go on with: that of the recording in `out`, or a new one without videos."""
+    environment = _environment(plan.task, plan.pictures, plan.episode_steps)
     new = Manifest(
         name=f"{plan.task}-{plan.behavior}",
         complete=False,
@@ -164,9 +164,7 @@ def _begin(out: Path, plan: Recording) -> Manifest:
         agent_size=plan.pictures.agent_size,
         render_profile=plan.pictures.profile,
         action_repeat=task_named(plan.task).action_repeat,
-        frames_per_second=_environment(plan.task, plan.pictures, plan.episode_steps).metadata.get(
-            "render_fps"
-        ),
+        frames_per_second=environment.metadata["render_fps"],
         conversion=None,
         versions=installed_versions(),
         shards=(),
