@@ -69,8 +69,8 @@ def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Contr
             return reacher.torques(simulator.physics, where)
 
         def wrong_place(rng: np.random.Generator) -> NDArray[np.float64]:
-            # Wrong wherever the target is: the suite draws targets 0.05 to 0.20 m from the center, so one of the
-            # far side's points is at least 0.1 m away from it.
+            # The suite draws targets 0.05 to 0.20 m from the center, so a point on the far side, 0.08 m or more from
+            # the center, is at least 0.12 m away from any.
             angle = rng.uniform(-np.pi / 4, np.pi / 4)
             opposite = -reacher.target_position(simulator.physics)
             direction = np.arctan2(opposite[1], opposite[0]) + angle
