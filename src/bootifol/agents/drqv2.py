@@ -9,7 +9,7 @@ not, and exploration noise on a linear schedule, which also smooths the targets.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import torch
@@ -19,6 +19,8 @@ from torch import Tensor, nn
 from bootifol.agents.networks import Actor, Critic, Encoder, EncoderName, initialize
 from bootifol.errors import BootifolError
 from bootifol.types import Action, Arrays, Batch, Metrics, Observation
+
+Precision = Literal["bf16", "fp32"]
 
 
 @dataclass(frozen=True)
@@ -75,19 +77,35 @@ class DrQv2Config:
     shift: int = 4
     """Largest random shift of the pictures in pixels."""
 
-    precision: Literal["bf16", "fp32"] = "bf16"
+    precision: Precision = "bf16"
     """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""
 
     def __post_init__(self) -> None:
-        for name in ("feature_dim", "hidden_dim", "batch_size", "update_every", "n_step", "replay_capacity"):
-            if getattr(self, name) < 1:
-                raise BootifolError(f"agent {name} must be at least 1, not {getattr(self, name)}")
-        for name in ("exploration_start", "exploration_end", "exploration_steps", "noise_clip"):
-            if getattr(self, name) < 0:
-                raise BootifolError(f"agent {name} must not be negative, but is {getattr(self, name)}")
-        for name in ("warm_up_steps", "shift"):
-            if getattr(self, name) < 0:
-                raise BootifolError(f"agent {name} must not be negative, but is {getattr(self, name)}")
+        for name, choices in (("encoder", get_args(EncoderName)), ("precision", get_args(Precision))):
+            if getattr(self, name) not in choices:
+                raise BootifolError(
+                    f"agent {name} must be one of {', '.join(choices)}, not {getattr(self, name)}"
+                )
+        at_least_one = (
+            "feature_dim",
+            "hidden_dim",
+            "batch_size",
+            "update_every",
+            "n_step",
+            "replay_capacity",
+        )
+        not_negative = (
+            "exploration_start",
+            "exploration_end",
+            "exploration_steps",
+            "noise_clip",
+            "warm_up_steps",
+            "shift",
+        )
+        for names, least in ((at_least_one, 1), (not_negative, 0)):
+            for name in names:
+                if not getattr(self, name) >= least:
+                    raise BootifolError(f"agent {name} must be at least {least}, not {getattr(self, name)}")
         for name in ("discount", "target_rate"):
             if not 0 <= getattr(self, name) <= 1:
                 raise BootifolError(f"agent {name} must lie in [0, 1], not {getattr(self, name)}")
