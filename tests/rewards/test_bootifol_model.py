@@ -1,0 +1,272 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from bootifol.errors import BootifolError
+from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.bootifol.model import BootifolRewardModel
+from bootifol.types import FrameBatch, Video
+
+SMALL = BootifolConfig(width_divisor=32, videos_per_class=3, learning_rate=1e-3)
+SIZE = 32
+FRAMES = 12
+
+
+class DotVideos:
+    """A bright dot on a dark ground that moves right, or (`jumps`) to a random place every frame."""
+
+    def __init__(
+        self, name: str, jumps: bool, count: int = 8, size: int = SIZE, frames: int = FRAMES
+    ) -> None:
+        rng = np.random.default_rng(7)
+        self.name = name
+        self.videos = rng.integers(0, 40, (count, frames, size, size, 3), dtype=np.uint8)
+        for video in self.videos:
+            x, y = rng.integers(0, size // 2, 2)
+            for t, frame in enumerate(video):
+                if jumps:
+                    x, y = rng.integers(0, size - 4, 2)
+                column = x if jumps else (x + t) % size
+                frame[y : y + 4, column : column + 4] = (250, 120, 30)
+
+    def __len__(self) -> int:
+        return len(self.videos)
+
+    def __getitem__(self, index: int) -> Video:
+        return Video(f"{self.name}-{index}", self.videos[index])
+
+    def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
+        return self.videos[rng.choice(len(self.videos), count, replace=False)]
+
+
+EXPERT = DotVideos("expert", jumps=False)
+OTHER = DotVideos("other", jumps=True)
+
+
+def make(config: BootifolConfig = SMALL, seed: int = 0, size: int = SIZE) -> BootifolRewardModel:
+    return BootifolRewardModel(config, size, seed)
+
+
+def aligned(steps: int, config: BootifolConfig = SMALL) -> BootifolRewardModel:
+    model = make(config)
+    steps_of = model.align(EXPERT, OTHER)
+    for _ in range(steps):
+        next(steps_of)
+    return model
+
+
+@pytest.mark.parametrize("precision", ["fp32", "bf16"])
+def test_alignment_lowers_the_loss_and_separates_the_classes(precision: str) -> None:
+    model = make(replace(SMALL, precision=precision))
+    steps = model.align(EXPERT, OTHER)
+    history = [next(steps) for _ in range(50)]
+    first, last = history[0], history[-1]
+    assert set(first) == {
+        "loss/multiview",
+        "loss/triplet",
+        "loss/autoencoder",
+        "loss/prediction",
+        "loss/sequence",
+        "loss/total",
+        "distance/expert_other",
+    }
+    assert last["loss/total"] < 0.8 * first["loss/total"]
+    assert last["loss/sequence"] < 0.5 * first["loss/sequence"]
+    reward = {
+        source.name: float(np.mean([model.label(source[i], [EXPERT[7]]).sum() for i in range(4)]))
+        for source in (EXPERT, OTHER)
+    }
+    assert reward["expert"] > reward["other"]
+
+
+def test_total_is_the_weighted_sum_and_zero_weights_leave_losses_out() -> None:
+    config = replace(SMALL, multiview_weight=0.25, triplet_weight=2.0, autoencoder_weight=0.0)
+    metrics = next(make(config).align(EXPERT, OTHER))
+    assert "loss/autoencoder" not in metrics
+    expected = 0.25 * metrics["loss/multiview"] + 2 * metrics["loss/triplet"]
+    expected += metrics["loss/prediction"] + metrics["loss/sequence"]
+    assert metrics["loss/total"] == pytest.approx(expected, rel=1e-5)
+
+
+def test_label_is_the_distance_of_prefix_encodings() -> None:
+    model = aligned(2)
+    video, reference = OTHER[0], EXPERT[1]
+    rewards = model.label(video, [reference])
+    assert rewards.dtype == np.float32
+    difference = model.embed(video.frames)[1:] - model.embed(reference.frames)[1:]
+    np.testing.assert_allclose(rewards, -np.linalg.norm(difference, axis=1), rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(model.label(reference, [reference]), 0.0, atol=1e-5)
+
+
+def test_cosine_reward() -> None:
+    model = aligned(2, replace(SMALL, reward="cosine"))
+    z, z_expert = model.embed(OTHER[0].frames)[1:], model.embed(EXPERT[1].frames)[1:]
+    cosine = (z * z_expert).sum(1) / np.linalg.norm(z, axis=1) / np.linalg.norm(z_expert, axis=1)
+    np.testing.assert_allclose(model.label(OTHER[0], [EXPERT[1]]), cosine, rtol=1e-4)
+
+
+@pytest.mark.parametrize("precision", ["fp32", "bf16"])
+def test_future_frames_leave_past_rewards_untouched(precision: str) -> None:
+    model = aligned(2, replace(SMALL, precision=precision))
+    before = model.label(OTHER[0], [EXPERT[0]])
+    for changed in (1, 6, FRAMES - 1):
+        frames = OTHER[0].frames.copy()
+        frames[changed] = 255 - frames[changed]
+        after = model.label(Video("changed", frames), [EXPERT[0]])
+        np.testing.assert_array_equal(after[: changed - 1], before[: changed - 1])
+        assert after[changed - 1] != before[changed - 1]
+
+
+def test_labeling_changes_nothing() -> None:
+    model = aligned(2)
+    before = model.state()
+    first = model.label(OTHER[0], [EXPERT[0]])
+    np.testing.assert_array_equal(model.label(OTHER[0], [EXPERT[0]]), first)
+    after = model.state()
+    assert all(np.array_equal(before[name], after[name]) for name in before)
+
+
+def test_references_are_encoded_once_for_each_version_of_the_encoders(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = aligned(1)
+    encoded: list[int] = []
+    encode = model._encode
+    monkeypatch.setattr(model, "_encode", lambda videos: encoded.append(len(videos)) or encode(videos))
+    model.label(OTHER[0], [EXPERT[0]])
+    model.label(OTHER[1], [EXPERT[0]])
+    model.label(OTHER[1], [EXPERT[1]])
+    assert encoded == [2, 1, 2]
+    old = model.label(OTHER[1], [EXPERT[0]])
+    version = model.version
+    model.update(EXPERT, OTHER)
+    assert model.version == version + 1
+    encoded.clear()
+    assert not np.array_equal(model.label(OTHER[1], [EXPERT[0]]), old)
+    assert encoded == [2]
+
+
+@pytest.mark.parametrize("aggregate", ["mean", "min", "soft_min"])
+def test_several_references_are_aggregated_at_every_time_step(aggregate: str) -> None:
+    single = aligned(2)
+    several = aligned(2, replace(SMALL, references=3, aggregate=aggregate, soft_min_temperature=0.01))
+    assert several.reference_count == 3
+    references = [EXPERT[i] for i in range(3)]
+    each = np.stack([single.label(OTHER[0], [reference]) for reference in references])
+    if aggregate == "mean":
+        expected = each.mean(0)
+    elif aggregate == "min":
+        expected = each.max(0)
+    else:
+        weights = np.exp(each / 0.01) / np.exp(each / 0.01).sum(0)
+        expected = (weights * each).sum(0)
+    np.testing.assert_allclose(several.label(OTHER[0], references), expected, rtol=1e-3, atol=1e-6)
+
+
+def test_alignment_scale_gives_random_episodes_about_minus_one_a_step() -> None:
+    model = aligned(60, replace(SMALL, reward_scale="alignment"))
+    rewards = [model.label(OTHER[i], [EXPERT[i]]).mean() for i in range(8)]
+    assert -1.6 < np.mean(rewards) < -0.6
+    scale = model.state()["reward_scale"].copy()
+    model.update(EXPERT, OTHER)
+    np.testing.assert_array_equal(model.state()["reward_scale"], scale)
+
+
+def test_resumed_training_is_bit_for_bit_the_uninterrupted_one() -> None:
+    config = replace(SMALL, precision="bf16", frames_per_video=5, reward_scale="alignment")
+    straight = aligned(4, config)
+    stopped = aligned(2, config)
+    resumed = make(config, seed=99)
+    resumed.load_state({name: array.copy() for name, array in stopped.state().items()})
+    steps = resumed.align(EXPERT, OTHER)
+    next(steps)
+    next(steps)
+    assert resumed.version == straight.version == 4
+    one, two = straight.state(), resumed.state()
+    assert one.keys() == two.keys()
+    for name, array in one.items():
+        np.testing.assert_array_equal(array, two[name], err_msg=name)
+    np.testing.assert_array_equal(resumed.label(OTHER[0], [EXPERT[0]]), straight.label(OTHER[0], [EXPERT[0]]))
+
+
+def test_state_is_a_copy_and_seeds_decide_everything() -> None:
+    model = aligned(1)
+    state = model.state()
+    copies = {name: array.copy() for name, array in state.items()}
+    model.update(EXPERT, OTHER)
+    assert all(np.array_equal(state[name], copies[name]) for name in state)
+    torch.manual_seed(12345)  # whatever the global generator holds
+    again = aligned(1).state()
+    assert all(np.array_equal(again[name], copies[name]) for name in copies)
+    other_seed = make(seed=1).state()["network/sequence_encoder.output.weight"]
+    assert not np.array_equal(other_seed, make(seed=0).state()["network/sequence_encoder.output.weight"])
+
+
+def test_a_state_of_another_configuration_is_refused() -> None:
+    with pytest.raises(BootifolError, match="does not fit its configuration"):
+        make(replace(SMALL, width_divisor=16)).load_state(make().state())
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_loss_that_is_not_finite_takes_no_step(bad: float) -> None:
+    model = aligned(2)
+    with torch.no_grad():
+        model.networks.sequence_encoder.output.bias[0] = bad
+    before = model.state()
+    with pytest.raises(BootifolError, match=r"not a finite number at its gradient step 3.*last checkpoint"):
+        model.update(EXPERT, OTHER)
+    after = model.state()
+    for name in before:
+        if name != "random":
+            np.testing.assert_array_equal(before[name], after[name], err_msg=name)
+
+
+def test_frames_per_video_leaves_the_sequence_losses_on_all_frames() -> None:
+    few = next(make(replace(SMALL, frames_per_video=3, frame_drop=0.0)).align(EXPERT, OTHER))
+    every = next(make(replace(SMALL, frame_drop=0.0)).align(EXPERT, OTHER))
+    assert few["loss/sequence"] == pytest.approx(every["loss/sequence"], rel=1e-4)
+    assert few["loss/multiview"] < every["loss/multiview"]  # fewer frames, fewer negatives
+
+
+def test_videos_of_the_paper_size() -> None:
+    expert, other = DotVideos("e", False, 3, 64, 8), DotVideos("o", True, 3, 64, 8)
+    model = make(size=64)
+    next(model.align(expert, other))
+    assert model.label(other[0], [expert[0]]).shape == (7,)
+
+
+def test_mistakes_are_refused_with_a_sentence() -> None:
+    model = make()
+    with pytest.raises(BootifolError, match="reads uint8 videos of 32x32 RGB frames"):
+        model.label(Video("large", np.zeros((5, 64, 64, 3), np.uint8)), [EXPERT[0]])
+    with pytest.raises(BootifolError, match="wants 1 reference videos, but was given 0"):
+        model.label(OTHER[0], [])
+    with pytest.raises(BootifolError, match="short has 5 frames, fewer than the 12 of other-0"):
+        model.label(OTHER[0], [Video("short", EXPERT[0].frames[:5])])
+    with pytest.raises(BootifolError, match="uint8 videos of 32x32"):
+        next(model.align(DotVideos("large", False, 3, 64), OTHER))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("references", 0),
+        ("temperature", 0.0),
+        ("triplet_weight", -1.0),
+        ("videos_per_class", 1),
+        ("frame_drop", 1.0),
+        ("frames_per_video", 0),
+        ("width_divisor", 0),
+        ("width_divisor", 64),
+    ],
+)
+def test_bad_configurations_are_refused_with_a_sentence(field: str, value: float) -> None:
+    with pytest.raises(BootifolError, match=field):
+        replace(BootifolConfig(), **{field: value})
+
+
+def test_scaled_cosine_is_refused() -> None:
+    with pytest.raises(BootifolError, match="reward_scale"):
+        BootifolConfig(reward="cosine", reward_scale="alignment")

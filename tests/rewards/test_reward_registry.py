@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+
+from bootifol.errors import BootifolError
+from bootifol.rewards.base import RewardModel
+from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.registry import METHODS, RewardConfig, make_reward_model
+from bootifol.types import Video
+
+CONFIG = RewardConfig(BootifolConfig(width_divisor=32))
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+def test_every_method_can_be_made(method: str) -> None:
+    model: RewardModel = make_reward_model(method, CONFIG, 32, seed=0)
+    model.load_state(model.state())
+    assert model.version == 0
+    assert model.reads_environment_reward == (method == "environment")
+
+
+def test_unknown_methods_are_refused_with_the_known_ones() -> None:
+    with pytest.raises(BootifolError, match="no reward method 'gail'; choose one of bootifol, environment"):
+        make_reward_model("gail", CONFIG, 32, seed=0)
+
+
+def test_the_upper_bound_passes_on_the_true_reward() -> None:
+    model = make_reward_model("environment", CONFIG, 32, seed=0)
+    frames = np.zeros((4, 32, 32, 3), np.uint8)
+    rewards = np.array([0.0, 1.0, 2.0], np.float32)
+    assert model.reference_count == 0
+    np.testing.assert_array_equal(model.label(Video("agent-0", frames, rewards), []), rewards)
+    with pytest.raises(BootifolError, match="demo-0 has none"):
+        model.label(Video("demo-0", frames), [])
+
+
+def test_the_upper_bound_learns_nothing() -> None:
+    model = make_reward_model("environment", CONFIG, 32, seed=0)
+    assert list(model.align(None, None)) == []  # type: ignore[arg-type]
+    assert model.update(None, None) == {}  # type: ignore[arg-type]
+    assert model.state() == {}
