@@ -162,9 +162,10 @@ def _context_class(mujoco: Any) -> Any:
 def no_rendering(error: BaseException) -> BootifolError:
     """The sentence for a machine that cannot render."""
     platform = os.environ.get("MUJOCO_GL", "unset")
+    headless = "" if platform == "egl" else "type `export MUJOCO_GL=egl`, and "
     return BootifolError(
-        f"MuJoCo cannot render pictures here (MUJOCO_GL is {platform}; {type(error).__name__}: {error}); on Debian "
-        "or Ubuntu type `apt-get install libegl1 libgl1-mesa-dri` (as root), then see `bootifol doctor`"
+        f"MuJoCo cannot render pictures here (MUJOCO_GL is {platform}; {type(error).__name__}: {error}); {headless}on "
+        "Debian or Ubuntu type `apt-get install libegl1 libgl1-mesa-dri` (as root), then try `bootifol doctor`"
     )
 
 
