@@ -3,7 +3,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from bootifol.demos import record as module
 from bootifol.demos import shards
 from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.manifest import read_manifest
 from bootifol.demos.record import Recording, record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
@@ -139,6 +141,28 @@ def recorded_by_two_workers(tmp_path_factory: pytest.TempPathFactory) -> Iterato
 def test_two_workers_record_the_same_videos_as_one(tmp_path: Path, recorded_by_two_workers: Path) -> None:
     alone = record("drawn_reach", "half_good", 5, tmp_path / "half_good", PICTURES, 3, STEPS, workers=1)
     assert alone.manifest.videos == DemoSet.open(recorded_by_two_workers).manifest.videos
+
+
+def test_a_worker_that_dies_gives_a_sentence_and_keeps_what_was_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class DyingPool:
+        def __init__(self, workers: int, **options: object) -> None:
+            self.calls = 0
+
+        def map(self, function: Callable[[int], object], indices: range) -> Iterator[object]:
+            self.calls += 1
+            if self.calls == 2:
+                raise BrokenProcessPool
+            return map(function, indices)
+
+        def shutdown(self, cancel_futures: bool) -> None:
+            pass
+
+    monkeypatch.setattr(module, "ProcessPoolExecutor", DyingPool)
+    with pytest.raises(BootifolError, match="a worker process died while recording"):
+        record_drawn(tmp_path / "set", workers=2)
+    assert len(read_manifest(tmp_path / "set").videos) == 2
 
 
 @pytest.mark.parametrize(
