@@ -6,7 +6,6 @@ import functools
 import os
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import tyro
 from rich.console import Console
@@ -74,7 +73,7 @@ def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
         "doctor": doctor,
         "tasks": tasks,
         "demos": _demos_placeholder,
-        "train": _with_default(train, config=preset_of(words)),
+        "train": functools.partial(train, config=preset_of(words)),
         "evaluate": evaluate,
         "score": score,
         "report": report,
@@ -90,12 +89,6 @@ def _demos_commands() -> dict[str, Callable[..., int]]:
 def _demos_placeholder() -> int:
     """Make, import and check sets of videos to learn from: demos record, demos import, demos check."""
     return main(["demos", "--help"])
-
-
-def _with_default(function: Callable[..., int], **defaults: Any) -> Callable[..., int]:
-    partial = functools.partial(function, **defaults)
-    functools.update_wrapper(partial, function)
-    return partial
 
 
 def _escaped(text: str) -> str:

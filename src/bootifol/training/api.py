@@ -34,7 +34,7 @@ from bootifol.training.components import (
 from bootifol.training.config import TrainingConfig
 from bootifol.training.interactive import evaluation_seeds
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run, start_run
+from bootifol.training.train import Run
 from bootifol.types import Rewards, Video
 
 
@@ -69,7 +69,12 @@ def train_policy(
     Raises:
         BootifolError: bad input, or an error that the run can be resumed from, which its sentence says.
     """
-    task_named(task)
+    directory, console = Path(out), Console(stderr=True)
+    if (directory / "config.json").exists():
+        raise BootifolError(
+            f"{directory} holds a run already: go on with `bootifol train --resume {directory}`, or choose "
+            "another --out"
+        )
     run = RunConfig(
         task=task,
         method=method,
@@ -79,8 +84,9 @@ def train_policy(
         time_budget=time_budget,
         training=config or preset_named(preset),
     )
-    directory = start_run(run, Path(out), list(command))
-    continue_run(directory)
+    learner = Run(run, directory, console)
+    run.write(directory, list(command))
+    _learn_and_report(learner)
     return directory
 
 
@@ -90,14 +96,8 @@ def continue_run(directory: Path | str) -> bool:
     Returns:
         False if it was asked to stop before its end.
     """
-    console = Console(stderr=True)
-    run = Run(Path(directory), console)
-    if not run.learn():
-        return False
-    run.finish()
-    target = report([Path(directory)], Path(directory) / "report.html")
-    console.print(f"report: {target}")
-    return True
+    run = RunConfig.read(Path(directory))
+    return _learn_and_report(Run(run, Path(directory), Console(stderr=True)))
 
 
 @dataclass(frozen=True)
@@ -166,6 +166,15 @@ def write_scores(path: Path, scores: dict[str, Rewards]) -> None:
         writer.writerow(["video", "step", "reward"])
         for name, rewards in scores.items():
             writer.writerows([name, step, f"{reward:.6g}"] for step, reward in enumerate(rewards))
+
+
+def _learn_and_report(run: Run) -> bool:
+    if not run.learn():
+        return False
+    run.finish()
+    target = report([run.directory], run.directory / "report.html")
+    run.console.print(f"report: {target}")
+    return True
 
 
 def _read_videos(path: Path, size: int) -> list[Video]:

@@ -39,36 +39,22 @@ from bootifol.training.run_config import RunConfig
 from bootifol.types import Action, Metrics, Observation, Video
 
 
-def start_run(run: RunConfig, directory: Path, command: list[str]) -> Path:
-    """Makes the directory of a new run.
-
-    Raises:
-        BootifolError: there is a run already.
-    """
-    if (directory / "config.json").exists():
-        raise BootifolError(
-            f"{directory} holds a run already: go on with `bootifol train --resume {directory}`, or choose "
-            "another --out"
-        )
-    run.write(directory, command)
-    return directory
-
-
 class Run:
-    """A run in progress; made from the directory of a new run or of one that was interrupted.
+    """A run in progress.
 
     Args:
-        directory: holds `config.json`, and the newest checkpoint if the run was started before.
+        run: what it is.
+        directory: where it writes; its newest checkpoint is gone on from, if there is one.
         console: where messages go.
 
     Raises:
         BootifolError: the configuration, the demos or the checkpoint cannot be used.
     """
 
-    def __init__(self, directory: Path, console: Console | None = None) -> None:
+    def __init__(self, run: RunConfig, directory: Path, console: Console) -> None:
+        self.run = run
         self.directory = directory
-        self.console = console or Console(stderr=True)
-        self.run = RunConfig.read(directory)
+        self.console = console
         config = self.run.training
         torch.set_num_threads(config.threads)
         self.task = task_named(self.run.task)
@@ -84,7 +70,6 @@ class Run:
             config.alignment.gradient_steps,
             config.alignment.time_share,
         )
-        self.tracker = Tracker(directory, config.tensorboard)
         self.interactive = InteractivePhase(
             self.environment,
             self.demos.expert,
@@ -107,6 +92,7 @@ class Run:
         Returns:
             True when the run has ended; False when it was asked to stop and can be resumed.
         """
+        self.tracker = Tracker(self.directory, self.run.training.tensorboard)
         with Interruption() as interruption:
             try:
                 return self._align(interruption) and self._interact(interruption)
