@@ -252,10 +252,8 @@ class DrQv2:
         features = features.detach()
         with torch.no_grad(), self._autocast():
             trunk = self.critic.trunk(features)
-        self.critic.requires_grad_(False)
         with self._autocast():
             loss_of_actor = actor_loss(*self.critic.value(trunk, self._noisy(self.actor(features), stddev)))
-        self.critic.requires_grad_(True)
         self._step(self._actor_optimizer, loss_of_actor, "actor")
 
         with torch.no_grad():
@@ -340,7 +338,8 @@ class DrQv2:
                 "resume from the last checkpoint with a lower learning rate"
             )
         optimizer.zero_grad(set_to_none=True)
-        torch.autograd.backward(loss)
+        # Naming the inputs spares the actor's loss the gradients of the critic's weights.
+        torch.autograd.backward(loss, inputs=optimizer.param_groups[0]["params"])
         optimizer.step()
 
 
