@@ -12,16 +12,24 @@ from importlib import metadata
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from bootifol.envs.pictures import RenderProfile
+from bootifol.envs.pictures import PictureConfig, RenderProfile
 from bootifol.errors import BootifolError
+from bootifol.experts import make_random
+from bootifol.tasks import make_environment
 
 _TASK = "reacher_hard"
 _PICTURE_SIZE = 64
 _STEPS = 12
 _MATRIX_SIZE = 512
+_DRAWN: dict[RenderProfile, str] = {
+    "fast": "no shadows, no reflections; smoothed by averaging",
+    "balanced": "coarse shadows",
+    "full": "all that the simulator offers",
+}
 
 
 def doctor() -> int:
@@ -60,13 +68,6 @@ def doctor() -> int:
     console.print(table)
     console.print("this machine can record videos and train")
     return 0
-
-
-_DRAWN: dict[RenderProfile, str] = {
-    "fast": "no shadows, no reflections; smoothed by averaging",
-    "balanced": "coarse shadows",
-    "full": "all that the simulator offers",
-}
 
 
 def installed() -> tuple[dict[str, tuple[str | None, str]], list[str]]:
@@ -120,12 +121,6 @@ def milliseconds_per_step(profile: RenderProfile) -> float:
     Raises:
         BootifolError: pictures cannot be rendered here.
     """
-    import numpy as np
-
-    from bootifol.envs.pictures import PictureConfig
-    from bootifol.experts import make_random
-    from bootifol.tasks import make_environment
-
     pictures = PictureConfig(agent_size=_PICTURE_SIZE, video_size=_PICTURE_SIZE, profile=profile)
     environment = make_environment(_TASK, pictures, _STEPS)
     act = make_random(environment, seed=0)

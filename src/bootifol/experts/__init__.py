@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from bootifol.envs.drawn import SPEED
 from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
-from bootifol.experts import reacher
-from bootifol.experts.behaviors import Behavior, Controller, HalfGood, no_actions, random_actions
+from bootifol.experts import drawn_reach, reacher
+from bootifol.experts.behaviors import (
+    Behavior,
+    Controller,
+    HalfGood,
+    WrongGoal,
+    no_actions,
+    random_actions,
+)
 from bootifol.types import Action
 
 __all__ = ["Behavior", "make_behavior", "make_expert", "make_random"]
-
-WrongGoal = Callable[[np.random.Generator], NDArray[np.float64]]
 
 
 def make_expert(task_name: str, environment: gymnasium.Env[Any, Any]) -> Act:
@@ -59,38 +62,22 @@ def make_behavior(behavior: Behavior, task_name: str, environment: gymnasium.Env
     )
 
 
-def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Controller, WrongGoal | None]:
+def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Controller, WrongGoal]:
     """A task's scripted controller, and how to draw a wrong goal for it."""
     simulator: Any = environment.unwrapped.simulator  # type: ignore[attr-defined]
     if task_name == "reacher_hard":
+        physics = simulator.physics
 
         def reach(goal: NDArray[np.float64] | None) -> Action:
-            where = reacher.target_position(simulator.physics) if goal is None else goal
-            return reacher.torques(simulator.physics, where)
+            return reacher.torques(physics, reacher.target_position(physics) if goal is None else goal)
 
-        def wrong_place(rng: np.random.Generator) -> NDArray[np.float64]:
-            # The suite draws targets 0.05 to 0.20 m from the center, so a point on the far side, 0.08 m or more from
-            # the center, is at least 0.12 m away from any.
-            angle = rng.uniform(-np.pi / 4, np.pi / 4)
-            opposite = -reacher.target_position(simulator.physics)
-            direction = np.arctan2(opposite[1], opposite[0]) + angle
-            return rng.uniform(0.08, 0.2) * np.array([np.cos(direction), np.sin(direction)])
-
-        return reach, wrong_place
+        return reach, lambda rng: reacher.wrong_place(reacher.target_position(physics), rng)
     if task_name == "drawn_reach":
 
         def move(goal: NDArray[np.float64] | None) -> Action:
-            away = (simulator.target if goal is None else goal) - simulator.dot
-            action: Action = np.clip(away / SPEED, -1.0, 1.0).astype(np.float32)
-            return action
+            return drawn_reach.move(simulator.dot, simulator.target if goal is None else goal)
 
-        def wrong_spot(rng: np.random.Generator) -> NDArray[np.float64]:
-            spot = rng.uniform(-0.9, 0.9, 2)
-            while np.hypot(*(spot - simulator.target)) < 0.6:
-                spot = rng.uniform(-0.9, 0.9, 2)
-            return spot
-
-        return move, wrong_spot
+        return move, lambda rng: drawn_reach.wrong_place(simulator.target, rng)
     raise BootifolError(f"there is no expert for the task {task_name}; import videos of it instead")
 
 

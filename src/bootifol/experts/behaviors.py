@@ -17,6 +17,9 @@ Behavior = Literal["expert", "half_good", "random", "still"]
 Controller = Callable[[NDArray[np.float64] | None], Action]
 """A scripted controller: the action toward the task's own goal (None) or toward another point of its space."""
 
+WrongGoal = Callable[[np.random.Generator], NDArray[np.float64]]
+"""Draws a point that is far from the goal of the episode that the simulator shows."""
+
 
 class HalfGood:
     """Does something right but not the task; each episode is one of three kinds, drawn from its seed.
@@ -29,7 +32,7 @@ class HalfGood:
         controller: the task's expert.
         environment: what it acts in.
         seed: of the kinds and of the noise.
-        wrong_goal: draws a wrong place; None for tasks without places.
+        wrong_goal: draws a wrong place; called once, at the first step.
     """
 
     def __init__(
@@ -37,20 +40,20 @@ class HalfGood:
         controller: Controller,
         environment: gymnasium.Env[Any, Any],
         seed: int,
-        wrong_goal: Callable[[np.random.Generator], NDArray[np.float64]] | None,
+        wrong_goal: WrongGoal,
     ) -> None:
         self._controller = controller
         self._steps_of_an_episode: int = environment.unwrapped.episode_steps  # type: ignore[attr-defined]
         self._rng = np.random.default_rng([seed, 3])
         self._action_dim = environment.action_space.shape[0]  # type: ignore[index]
-        self._kind = int(self._rng.integers(3 if wrong_goal else 2))
+        self._kind = int(self._rng.integers(3))
         self._wrong_goal = wrong_goal
         self._goal: NDArray[np.float64] | None = None
         self._step = 0
 
     def __call__(self, observation: Observation) -> Action:
         """One action; the observation is not needed."""
-        if self._step == 0 and self._wrong_goal:
+        if self._step == 0:
             # Only now does the simulator show this episode's start.
             self._goal = self._wrong_goal(self._rng)
         self._step += 1

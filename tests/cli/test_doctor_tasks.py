@@ -1,0 +1,136 @@
+import os
+import subprocess
+import sys
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bootifol import tasks as catalogue
+from bootifol.cli import doctor as doctor_command
+from bootifol.cli.main import main
+from bootifol.envs import camera
+from bootifol.tasks import TASKS
+
+
+@pytest.fixture(autouse=True)
+def wide_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+
+
+@pytest.mark.usefixtures("requires_rendering")
+def test_doctor_shows_versions_machine_and_render_profiles(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor"]) == 0
+    printed = capsys.readouterr().out
+    for package in ("torch", "mujoco", "dm-control", "gymnasium", "numpy"):
+        assert any(package in line and metadata.version(package) in line for line in printed.splitlines())
+    for word in ("cores", "memory", "bf16 against fp32", "fast", "balanced", "full", "ms an agent step"):
+        assert word in printed
+    assert "missing" not in printed
+
+
+@pytest.mark.usefixtures("requires_rendering")
+def test_doctor_exits_with_2_and_a_sentence_when_nothing_renders(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def no_context(mujoco: Any) -> Any:
+        raise RuntimeError("no display")
+
+    monkeypatch.setattr(camera, "_context_class", no_context)
+    assert main(["doctor"]) == 2
+    captured = capsys.readouterr()
+    assert "bf16" in captured.out, "what could be measured is shown all the same"
+    assert "apt-get install libegl1 libgl1-mesa-dri" in captured.err
+    assert "RuntimeError: no display" in captured.err
+    assert "Traceback" not in captured.err
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is how Linux renders without a display")
+def test_doctor_without_an_egl_driver_leaves_no_traceback() -> None:
+    without_driver = {"MUJOCO_GL": "egl", "__EGL_VENDOR_LIBRARY_FILENAMES": os.devnull, "COLUMNS": "200"}
+    code = "import sys; from bootifol.cli.main import main; sys.exit(main(['doctor']))"
+    process = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, **without_driver}
+    )
+    assert process.returncode == 2
+    assert process.stderr.startswith("error: MuJoCo cannot render pictures here (MUJOCO_GL is egl;")
+    assert process.stderr.count("\n") == 1
+
+
+def test_doctor_names_missing_packages_and_how_to_install_them(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    version = metadata.version
+
+    def without_dm_control(name: str) -> str:
+        if name == "dm-control":
+            raise metadata.PackageNotFoundError(name)
+        return version(name)
+
+    monkeypatch.setattr(doctor_command.metadata, "version", without_dm_control)
+    assert main(["doctor"]) == 2
+    captured = capsys.readouterr()
+    assert "pip install 'dm-control>=1.0.28'" in captured.err
+    assert any("dm-control" in line and "missing" in line for line in captured.out.splitlines())
+
+
+def test_doctor_does_not_ask_for_what_only_developers_need() -> None:
+    versions, missing = doctor_command.installed()
+    assert not missing
+    assert "torch" in versions
+    assert "pytest" not in versions
+
+
+def test_doctor_sees_a_driver_that_paints_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def drawn_black(task_name: str, pictures: Any, episode_steps: int) -> Any:
+        environment = catalogue.make_environment("drawn_reach", pictures, episode_steps)
+        black = np.zeros((pictures.picture_size, pictures.picture_size, 3), np.uint8)
+        monkeypatch.setattr(environment.simulator, "render", lambda: black)
+        return environment
+
+    monkeypatch.setattr(doctor_command, "make_environment", drawn_black)
+    assert main(["doctor"]) == 2
+    assert "every pixel is the same" in capsys.readouterr().err
+
+
+def test_tasks_prints_the_catalogue(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tasks"]) == 0
+    printed = capsys.readouterr().out
+    for task in TASKS.values():
+        row = next(line for line in printed.splitlines() if task.name in line)
+        cells = [cell.strip() for cell in row.strip("│ ").split("│")]
+        assert cells == [
+            task.name,
+            task.suite,
+            str(task.action_repeat),
+            str(task.episode_steps),
+            str(task.evaluation_steps),
+            f"{task.expert_return:g}",
+            f"{task.random_return:g}",
+        ]
+        assert f"{task.name}: {task.description}" in printed
+
+
+def test_tasks_measures_expert_and_random_on_evaluation_episodes(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delitem(TASKS, "reacher_hard")
+    assert main(["tasks", "--measure", "3"]) == 0
+    captured = capsys.readouterr()
+    assert "drawn_reach, expert: 3/3" in captured.err
+    rows = [line.strip("│ ").split("│") for line in captured.out.splitlines() if "±" in line and "│" in line]
+    assert [(row[1].strip(), row[2].strip()) for row in rows] == [("expert", "3"), ("random", "3")]
+    expert, random = (float(row[3].split("±")[0]) for row in rows)
+    # Seeds 0, 1, 2 and evaluation length, as in the catalogue's measurement.
+    assert expert == pytest.approx(TASKS["drawn_reach"].expert_return, rel=0.1)
+    assert random < 10
+    low, high = (float(number) for number in rows[0][4].split("…"))
+    assert low <= expert <= high
+
+
+def test_tasks_refuses_a_negative_number_of_episodes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tasks", "--measure", "-1"]) == 2
+    assert "--measure is a number of episodes, not -1" in capsys.readouterr().err

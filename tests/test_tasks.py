@@ -1,0 +1,36 @@
+import numpy as np
+import pytest
+
+from bootifol.envs.pictures import PictureConfig
+from bootifol.errors import BootifolError
+from bootifol.tasks import TASKS, make_environment, task_named
+
+
+@pytest.mark.parametrize("task", TASKS.values(), ids=list(TASKS))
+def test_the_catalogue_is_consistent(task: object) -> None:
+    assert task is task_named(task.name)  # type: ignore[attr-defined]
+    assert 0 < task.random_return < 0.1 * task.expert_return  # type: ignore[attr-defined]
+    steps = task.evaluation_steps * task.action_repeat  # type: ignore[attr-defined]
+    assert task.expert_return <= steps  # type: ignore[attr-defined]
+    assert 0 < task.episode_steps <= task.evaluation_steps  # type: ignore[attr-defined]
+
+
+def test_reacher_hard_is_the_papers_task() -> None:
+    task = task_named("reacher_hard")
+    assert (task.action_repeat, task.episode_steps, task.evaluation_steps) == (2, 60, 500)
+
+
+def test_an_unknown_task_is_refused_with_the_names_there_are() -> None:
+    with pytest.raises(BootifolError, match="no task 'reacher'; the tasks are reacher_hard, drawn_reach"):
+        task_named("reacher")
+    with pytest.raises(BootifolError, match="bootifol tasks"):
+        make_environment("", PictureConfig(), 1)
+
+
+def test_an_environment_has_the_length_and_pictures_asked_for() -> None:
+    environment = make_environment("drawn_reach", PictureConfig(agent_size=20, video_size=12, stack=2), 7)
+    observation, info = environment.reset(seed=0)
+    assert observation.shape == (20, 20, 6)
+    assert info["video_frame"].shape == (12, 12, 3)
+    ends = [environment.step(np.zeros(2, np.float32))[3] for _ in range(7)]
+    assert ends == [False] * 6 + [True]
