@@ -22,8 +22,13 @@ def played(task: str, behavior: Behavior, environment: PixelEnvironment, seed: i
     return play_episode(environment, make_behavior(behavior, task, environment, seed), seed, behavior)
 
 
-def mean_return(task: str, behavior: Behavior, steps: int, episodes: int) -> float:
+def mean_return(
+    monkeypatch: pytest.MonkeyPatch, task: str, behavior: Behavior, steps: int, episodes: int
+) -> float:
     environment = make_environment(task, SMALL, steps)
+    black = np.zeros((8, 8, 3), np.uint8)
+    # Nobody looks at the pictures.
+    monkeypatch.setattr(environment.simulator, "render", lambda: black)
     returns = [played(task, behavior, environment, seed).environment_return for seed in range(episodes)]
     environment.close()
     return float(np.mean(returns))
@@ -83,9 +88,10 @@ def test_random_actions_cover_the_range() -> None:
     assert abs(actions.mean()) < 0.1
 
 
-def test_drawn_reach_expert_beats_half_good_beats_random() -> None:
+def test_drawn_reach_expert_beats_half_good_beats_random(monkeypatch: pytest.MonkeyPatch) -> None:
     expert, half_good, random = (
-        mean_return("drawn_reach", behavior, STEPS, 20) for behavior in ("expert", "half_good", "random")
+        mean_return(monkeypatch, "drawn_reach", behavior, STEPS, 20)
+        for behavior in ("expert", "half_good", "random")
     )
     assert expert > 45
     assert 10 < half_good < 0.75 * expert
@@ -93,9 +99,10 @@ def test_drawn_reach_expert_beats_half_good_beats_random() -> None:
 
 
 @pytest.mark.usefixtures("requires_rendering")
-def test_reacher_expert_beats_half_good_beats_random() -> None:
+def test_reacher_expert_beats_half_good_beats_random(monkeypatch: pytest.MonkeyPatch) -> None:
     expert, half_good, random = (
-        mean_return("reacher_hard", behavior, 100, 2) for behavior in ("expert", "half_good", "random")
+        mean_return(monkeypatch, "reacher_hard", behavior, 100, 2)
+        for behavior in ("expert", "half_good", "random")
     )
     assert expert > 150, "of 200: on the target after a few dozen simulator steps, and it stays"
     assert random + 10 < half_good < 0.8 * expert
