@@ -39,7 +39,7 @@ def test_encoder_agrees_with_the_plain_table(size: int, layers: int) -> None:
     pictures = torch.randn(5, 3, size, size, dtype=torch.double).contiguous(memory_format=torch.channels_last)
     for training in (False, True):  # evaluation first: running statistics are new in both
         encoder.train(training)
-        states = encoder(pictures)
+        states = encoder(pictures[:, :1], pictures[:, 1:])
         assert states.shape == (5, 128)
         for view, own, columns in (
             (pictures[:, :1], encoder.lightness, slice(0, 64)),
@@ -52,7 +52,7 @@ def test_encoder_agrees_with_the_plain_table(size: int, layers: int) -> None:
 def test_decoder_agrees_with_the_plain_table() -> None:
     torch.manual_seed(0)
     decoder = FrameDecoder(64, width_divisor=16).double()
-    nn.init.normal_(decoder.bias)
+    nn.init.normal_(decoder.strided[-1].bias)
     states = torch.randn(5, 128, dtype=torch.double)
     for training in (False, True):  # evaluation first: running statistics are new in both
         table = _with_weights_of(decoder, plain.decoder(16)).train(training)
@@ -70,11 +70,9 @@ def _parameters(module: nn.Module) -> int:
 
 
 def _with_weights_of(source: nn.Module, target: nn.Sequential) -> nn.Sequential:
-    """Copies parameters, in float64, in the order of the layers (the decoder declares its last bias first)."""
-    parameters = [p for name, p in source.named_parameters() if name != "bias"]
-    parameters += [p for name, p in source.named_parameters() if name == "bias"]
+    """Copies parameters, in float64, in the order of the layers."""
     target.double()
     with torch.no_grad():
-        for own, other in zip(target.parameters(), parameters, strict=True):
+        for own, other in zip(target.parameters(), source.parameters(), strict=True):
             own.copy_(other.reshape(own.shape))
     return target

@@ -27,11 +27,12 @@ def test_convolution_and_gradients_agree_with_pytorch(size: int, count: int) -> 
 def test_transposed_convolution_and_gradients_agree_with_pytorch(size: int, count: int) -> None:
     torch.manual_seed(size + count)
     small = small_size(size)
-    layer = StridedTransposedConvolution(4, 3, size).double()
+    layer = StridedTransposedConvolution(4, 3, size, bias=True).double()
+    torch.nn.init.normal_(layer.bias)
     pictures = torch.randn(count, 4, small, small, dtype=torch.double).requires_grad_()
     padding = size - (2 * small + 3)
-    expected = F.conv_transpose2d(pictures, layer.weight, None, 2, output_padding=padding)
-    _assert_same(layer(pictures), expected, (pictures, layer.weight))
+    expected = F.conv_transpose2d(pictures, layer.weight, layer.bias, 2, output_padding=padding)
+    _assert_same(layer(pictures), expected, (pictures, layer.weight, layer.bias))
 
 
 def test_needs_no_gradient_of_the_pictures() -> None:

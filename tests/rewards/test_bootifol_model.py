@@ -59,10 +59,11 @@ def aligned(steps: int, config: BootifolConfig = SMALL) -> BootifolRewardModel:
 
 @pytest.mark.parametrize("precision", ["fp32", "bf16"])
 def test_alignment_lowers_the_loss_and_separates_the_classes(precision: str) -> None:
-    model = make(replace(SMALL, precision=precision))
+    model = make(replace(SMALL, precision=precision), seed=2)
     steps = model.align(EXPERT, OTHER)
     history = [next(steps) for _ in range(50)]
-    first, last = history[0], history[-1]
+    first = history[0]
+    last = {name: float(np.mean([metrics[name] for metrics in history[-15:]])) for name in first}
     assert set(first) == {
         "loss/multiview",
         "loss/triplet",

@@ -11,6 +11,7 @@ with tensor operations the same conversion took longer than the encoders of the 
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import numba
 import numpy as np
@@ -70,9 +71,10 @@ def _convert_pixels(
     root: Floats,
     factor: Floats,
     offset: Floats,
-    out: Floats,
+    lightness: Floats,
+    color: Floats,
 ) -> None:
-    """Fills `out[i]`, normalized Lab, from `rgb[i]`; both `[pixels, 3]`."""
+    """Fills `lightness[i]` and `color[i]`, normalized L and ab, `[pixels]` and `[pixels, 2]`, from `rgb[i]`."""
     for i in range(rgb.shape[0]):
         r = linear[rgb[i, 0]]
         g = linear[rgb[i, 1]]
@@ -86,26 +88,46 @@ def _convert_pixels(
         f_y = root[cell, 0] + (y - np.float32(cell)) * root[cell, 1]
         cell = np.int32(z)
         f_z = root[cell, 0] + (z - np.float32(cell)) * root[cell, 1]
-        out[i, 0] = factor[0] * f_y + offset[0]
-        out[i, 1] = factor[1] * (f_x - f_y) + offset[1]
-        out[i, 2] = factor[2] * (f_y - f_z) + offset[2]
+        lightness[i] = factor[0] * f_y + offset[0]
+        color[i, 0] = factor[1] * (f_x - f_y) + offset[1]
+        color[i, 1] = factor[2] * (f_y - f_z) + offset[2]
 
 
 _compiled: Callable[..., None] = numba.njit(nogil=True, fastmath=True)(_convert_pixels)
 
 
-def normalized_lab(rgb: NDArray[np.uint8], dtype: torch.dtype = torch.float32) -> torch.Tensor:
-    """RGB to normalized Lab, about 10 ns a pixel.
+def lab_views(
+    rgb: NDArray[np.uint8], dtype: torch.dtype = torch.float32
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """RGB to the two views, about 10 ns a pixel on one thread; uses as many threads as PyTorch does.
 
     Args:
         rgb: uint8 `[N, H, W, 3]`.
         dtype: float32, or bfloat16 where the encoders compute in it.
 
     Returns:
-        `dtype` `[N, 3, H, W]`, channels last in memory, about [-1, 1]: channel 0 is L (view 1), channels 1 and 2
-        are a and b (view 2).
+        Normalized L `[N, 1, H, W]` (view 1) and ab `[N, 2, H, W]` (view 2), both `dtype`, channels last in memory,
+        about [-1, 1].
     """
-    lab = np.empty(rgb.shape, np.float32)
+    count, height, width, _ = rgb.shape
+    lightness = np.empty((count, height, width, 1), np.float32)
+    color = np.empty((count, height, width, 2), np.float32)
     pixels = np.ascontiguousarray(rgb).reshape(-1, 3)
-    _compiled(pixels, _LINEAR, _TO_GRID, _ROOT, _FACTOR, _OFFSET, lab.reshape(-1, 3))
-    return torch.from_numpy(lab).to(dtype).permute(0, 3, 1, 2)
+    parts = torch.get_num_threads()
+    cuts = [len(pixels) * part // parts for part in range(parts + 1)]
+
+    def convert(start: int, stop: int) -> None:
+        _compiled(
+            pixels[start:stop],
+            *(_LINEAR, _TO_GRID, _ROOT, _FACTOR, _OFFSET),
+            lightness.reshape(-1)[start:stop],
+            color.reshape(-1, 2)[start:stop],
+        )
+
+    if parts == 1:
+        convert(0, len(pixels))
+    else:
+        with ThreadPoolExecutor(parts) as threads:
+            list(threads.map(convert, cuts[:-1], cuts[1:]))
+    views = (torch.from_numpy(view).to(dtype).permute(0, 3, 1, 2) for view in (lightness, color))
+    return next(views), next(views)

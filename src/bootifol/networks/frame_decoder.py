@@ -40,10 +40,8 @@ class FrameDecoder(nn.Module):
             self.strided.append(StridedTransposedConvolution(before, after, size))
             self.strided.append(nn.BatchNorm2d(after))
             self.strided.append(nn.LeakyReLU(leak))
-        self.strided.append(StridedTransposedConvolution(widths[-1], 3, sizes[-1]))
-        self.bias = nn.Parameter(torch.zeros(3, 1, 1))
+        self.strided.append(StridedTransposedConvolution(widths[-1], 3, sizes[-1], bias=True))
 
     def forward(self, states: torch.Tensor) -> torch.Tensor:
         """States `[N, 128]` to normalized Lab `[N, 3, H, W]`."""
-        pictures = self.strided(self.pointwise(states)[:, :, None, None])
-        return cast(torch.Tensor, pictures + self.bias.to(pictures.dtype))
+        return cast(torch.Tensor, self.strided(self.pointwise(states)[:, :, None, None]))

@@ -86,6 +86,6 @@ class FrameEncoder(nn.Module):
         self.lightness = ViewEncoder(1, video_size, width_divisor, leak)
         self.color = ViewEncoder(2, video_size, width_divisor, leak)
 
-    def forward(self, lab: torch.Tensor) -> torch.Tensor:
-        """Normalized Lab `[N, 3, H, W]` to states `[N, 128]`: first the 64 numbers of L, then those of ab."""
-        return torch.cat([self.lightness(lab[:, :1]), self.color(lab[:, 1:])], dim=1)
+    def forward(self, lightness: torch.Tensor, color: torch.Tensor) -> torch.Tensor:
+        """Views L `[N, 1, H, W]` and ab `[N, 2, H, W]` to states `[N, 128]`: 64 numbers of L, then 64 of ab."""
+        return torch.cat([self.lightness(lightness), self.color(color)], dim=1)

@@ -59,32 +59,40 @@ class StridedConvolution(nn.Module):
 
 
 class StridedTransposedConvolution(nn.Module):
-    """Transposed 5x5 convolution of stride 2 without bias: `[N, C, h, h]` to `[N, C', H, H]`.
+    """Transposed 5x5 convolution of stride 2: `[N, C, h, h]` to `[N, C', H, H]`.
 
     Args:
         channels_in: C.
         channels_out: C'.
         size_out: H; its last row and column are zero where the convolution would not have read them.
+        bias: adds one number per channel.
     """
 
-    def __init__(self, channels_in: int, channels_out: int, size_out: int) -> None:
+    def __init__(self, channels_in: int, channels_out: int, size_out: int, bias: bool = False) -> None:
         super().__init__()
         initial = nn.ConvTranspose2d(channels_in, channels_out, KERNEL, STRIDE, bias=False).weight
         self.weight = nn.Parameter(initial.detach().contiguous(memory_format=torch.channels_last))
+        self.bias = nn.Parameter(torch.zeros(channels_out)) if bias else None
         self.size_out = size_out
 
     def forward(self, pictures: torch.Tensor) -> torch.Tensor:
         weight = self.weight.to(pictures.dtype)
+        bias = None if self.bias is None else self.bias.to(pictures.dtype)
+        if pictures.shape[-1] >= STRIP_BELOW:
+            missing = self.size_out - ((pictures.shape[-1] - 1) * STRIDE + KERNEL)
+            return F.conv_transpose2d(pictures, weight, bias, STRIDE, output_padding=missing)
+        grown = self._grow_small(pictures, weight)
+        return grown if bias is None else grown + bias[:, None, None]
+
+    def _grow_small(self, pictures: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
         size = pictures.shape[-1]
         missing = self.size_out - ((size - 1) * STRIDE + KERNEL)
         if size == 1:
             pixels = pictures.flatten(1) @ _as_matrix(weight)
             large = pixels.reshape(-1, KERNEL, KERNEL, weight.shape[1]).permute(0, 3, 1, 2)
             return F.pad(large, (0, missing, 0, missing)) if missing else large
-        if size < STRIP_BELOW:
-            grown = _TransposedOnStrips.apply(pictures, weight, self.size_out)  # type: ignore[no-untyped-call]
-            return cast(torch.Tensor, grown)
-        return F.conv_transpose2d(pictures, weight, None, STRIDE, output_padding=missing)
+        grown = _TransposedOnStrips.apply(pictures, weight, self.size_out)  # type: ignore[no-untyped-call]
+        return cast(torch.Tensor, grown)
 
 
 class _OnStrips(torch.autograd.Function):

@@ -60,7 +60,10 @@ def autoencoder_loss(picture: torch.Tensor, decoded: torch.Tensor) -> torch.Tens
         picture: o `[N, 3, H, W]`.
         decoded: q_gamma(g_theta(o)) `[N, 3, H, W]`.
     """
-    return (decoded.float() - picture.float()).square().mean()
+    # Through the norm the squares are summed in float32 without a float32 copy of all pictures.
+    difference = decoded - picture
+    norm: torch.Tensor = torch.linalg.vector_norm(difference, dtype=torch.float32)
+    return norm.square() / difference.numel()
 
 
 def prediction_loss(

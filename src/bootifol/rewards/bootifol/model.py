@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from bootifol.errors import BootifolError
-from bootifol.networks.color import normalized_lab
+from bootifol.networks.color import lab_views
 from bootifol.rewards.bootifol import losses
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.networks import BootifolNetworks
@@ -151,9 +151,9 @@ class BootifolRewardModel:
         """
         config = self.config
         count, length = videos.shape[:2]
-        lab = self._views(videos.reshape(-1, *videos.shape[2:]))
+        lightness, color = self._views(videos.reshape(-1, *videos.shape[2:]))
         with self._autocast():
-            states = self.networks.frame_encoder(lab).float()
+            states = self.networks.frame_encoder(lightness, color).float()
         within = np.arange(count)[:, None] * length
         anchors = self._indices(within + drawn.anchors)
         anchor_states = states[anchors]
@@ -175,8 +175,8 @@ class BootifolRewardModel:
         if config.autoencoder_weight > 0:
             with self._autocast():
                 decoded = self.networks.frame_decoder(anchor_states)
-            every_frame = len(anchors) == len(lab)
-            terms["autoencoder"] = losses.autoencoder_loss(lab if every_frame else lab[anchors], decoded)
+            picture = torch.cat([lightness[anchors], color[anchors]], dim=1)
+            terms["autoencoder"] = losses.autoencoder_loss(picture, decoded)
 
         sequences = states.unflatten(0, (count, length))
         encodings, predicted = self.networks.encode_and_predict(
@@ -208,16 +208,17 @@ class BootifolRewardModel:
         try:
             with torch.inference_mode():
                 with self._autocast():
-                    states = self.networks.frame_encoder(self._views(frames)).float()
+                    states = self.networks.frame_encoder(*self._views(frames)).float()
                 parts = states.split([len(video) for video in videos])
                 return [self.networks.sequence_encoder(part[None])[0][0].cpu() for part in parts]
         finally:
             self.networks.train()
 
-    def _views(self, frames: Frames) -> torch.Tensor:
-        """uint8 `[N, H, W, 3]` to normalized Lab `[N, 3, H, W]`, channels last in memory."""
+    def _views(self, frames: Frames) -> tuple[torch.Tensor, torch.Tensor]:
+        """uint8 `[N, H, W, 3]` to the views L `[N, 1, H, W]` and ab `[N, 2, H, W]`."""
         dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32
-        return normalized_lab(frames, dtype).to(self.device)
+        lightness, color = lab_views(frames, dtype)
+        return lightness.to(self.device), color.to(self.device)
 
     def _aggregate(self, rewards: torch.Tensor) -> torch.Tensor:
         """Rewards by reference `[R, T]` to `[T]`."""
