@@ -99,6 +99,9 @@ class Batch:
     next_observation: torch.Tensor
     """uint8 `[B, 3 * stack, S, S]`, as `observation`."""
 
+    demonstrated: torch.Tensor | None = None
+    """bool `[B]`: which rows come from expert videos with inferred actions; None when none do (the paper)."""
+
 
 class VideoSource(Protocol):
     """Videos to draw from: a demo set on disk, or the agent's own episodes."""

@@ -77,6 +77,10 @@ class DrQv2Config:
     shift: int = 4
     """Largest random shift of the pictures in pixels."""
 
+    cloning_weight: float = 0.0
+    """Beyond the paper: how strongly the actor is pulled to the inferred actions of expert videos, relative to the
+    size of Q; 0, as in the paper, not at all. Needs `demonstrations`."""
+
     precision: Precision = "bf16"
     """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""
 
@@ -99,6 +103,7 @@ class DrQv2Config:
             "exploration_end",
             "exploration_steps",
             "noise_clip",
+            "cloning_weight",
             "warm_up_steps",
             "shift",
         )
@@ -131,6 +136,19 @@ def critic_loss(q1: Tensor, q2: Tensor, target: Tensor) -> Tensor:
 def actor_loss(q1: Tensor, q2: Tensor) -> Tensor:
     """Minus the mean of the smaller estimate (DrQ-v2, equation 2)."""
     return -torch.minimum(q1, q2).mean()
+
+
+def cloning_loss(action: Tensor, demonstrated_action: Tensor, q: Tensor) -> Tensor:
+    """Mean squared error to demonstrated actions, times the mean of |Q| so that its weight suits any reward's scale.
+
+    Not in DrQ-v2; the scale is that of TD3+BC (Fujimoto and Gu, 2021, equation 5), moved to the other term.
+
+    Args:
+        action: the actor's, `[B, A]`.
+        demonstrated_action: `[B, A]`.
+        q: the critic's estimates, `[B]`; no gradient passes.
+    """
+    return q.detach().abs().mean() * nn.functional.mse_loss(action, demonstrated_action)
 
 
 def noisy_action(mean: Tensor, stddev: float, clip: float | None, generator: torch.Generator) -> Tensor:
@@ -252,15 +270,22 @@ class DrQv2:
         features = features.detach()
         with torch.no_grad(), self._autocast():
             trunk = self.critic.trunk(features)
+        metrics = {}
         with self._autocast():
-            loss_of_actor = actor_loss(*self.critic.value(trunk, self._noisy(self.actor(features), stddev)))
+            mean_action = self.actor(features)
+            loss_of_actor = actor_loss(*self.critic.value(trunk, self._noisy(mean_action, stddev)))
+        if self.config.cloning_weight > 0 and batch.demonstrated is not None:
+            rows = batch.demonstrated
+            loss_of_cloning = cloning_loss(mean_action[rows], action[rows], q1)
+            loss_of_actor = loss_of_actor + self.config.cloning_weight * loss_of_cloning
+            metrics["agent/cloning_loss"] = float(loss_of_cloning.detach())
         self._step(self._actor_optimizer, loss_of_actor, "actor")
 
         with torch.no_grad():
             torch._foreach_lerp_(
                 list(self.target_critic.parameters()), list(self.critic.parameters()), self.config.target_rate
             )
-        return {
+        return metrics | {
             "agent/critic_loss": float(loss_of_critic.detach()),
             "agent/actor_loss": float(loss_of_actor.detach()),
             "agent/q": float(q1.detach().mean()),

@@ -165,8 +165,14 @@ class ReplayBuffer:
         self._rewards[(stored.start + np.arange(stored.agent_steps)) % self.capacity] = rewards
         return True
 
-    def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
-        """Draws transitions uniformly, with replacement; each observation has its own random shift.
+    def sample(self, batch_size: int, rng: np.random.Generator, same_shift: bool = False) -> Batch:
+        """Draws transitions uniformly, with replacement.
+
+        Args:
+            batch_size: how many.
+            rng: draws transitions and shifts.
+            same_shift: whether the two observations of a transition are shifted alike, for learning what moved
+                between them; otherwise each has its own random shift, as in DrQ-v2.
 
         Raises:
             BootifolError: the buffer is empty.
@@ -175,6 +181,8 @@ class ReplayBuffer:
             raise BootifolError("replay is empty: add an episode before sampling from it")
         drawn = rng.integers(len(self), size=batch_size)
         shifts = rng.integers(-self.shift, self.shift + 1, size=(2, batch_size, 2))
+        if same_shift:
+            shifts[1] = shifts[0]
 
         episode = np.searchsorted(self._transition_ends, drawn, side="right")
         start, steps = self._starts[episode], self._lengths[episode]

@@ -11,8 +11,11 @@ import numpy as np
 from rich.console import Console
 
 from bootifol.agents.drqv2 import DrQv2
+from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.demos.agent_videos import AgentVideos
+from bootifol.demos.check import differences
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.manifest import read_manifest
 from bootifol.demos.record import record
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import KINDS
@@ -21,6 +24,7 @@ from bootifol.rewards.base import RewardModel
 from bootifol.rewards.registry import make_reward_model
 from bootifol.tasks import make_environment, task_named
 from bootifol.training.checkpoint import Stateful
+from bootifol.training.demonstrations import Demonstrations
 from bootifol.training.run_config import RunConfig
 from bootifol.types import Video, VideoSource
 
@@ -47,15 +51,17 @@ class Components:
     agent: DrQv2
     replay: ReplayBuffer
     agent_videos: AgentVideos
+    demonstrations: Demonstrations | None
 
     def stateful(self) -> dict[str, Stateful]:
         """By the names of their files in a checkpoint."""
-        return {
+        parts: dict[str, Stateful] = {
             "reward_model": self.reward_model,
             "agent": self.agent,
             "replay": self.replay,
             "agent_videos": self.agent_videos,
         }
+        return parts if self.demonstrations is None else {**parts, "demonstrations": self.demonstrations}
 
 
 def build_environment(run: RunConfig, episode_steps: int) -> gymnasium.Env[Any, Any]:
@@ -81,7 +87,30 @@ def build_agent(run: RunConfig, environment: gymnasium.Env[Any, Any]) -> DrQv2:
     )
 
 
-def build_components(run: RunConfig, environment: gymnasium.Env[Any, Any], console: Console) -> Components:
+def build_demonstrations(run: RunConfig, expert: VideoSource, action_dim: int) -> Demonstrations | None:
+    """Expert videos as experience, where the configuration wants them."""
+    config, agent, pictures = run.training.demonstrations, run.training.agent, run.training.pictures
+    if config.share == 0:
+        return None
+    count = min(config.videos, len(expert))
+    replay = ReplayBuffer(
+        count * len(expert[0].frames),
+        pictures.agent_size,
+        action_dim,
+        pictures.stack,
+        agent.n_step,
+        agent.discount,
+        agent.shift,
+    )
+    inverse_dynamics = InverseDynamics(
+        agent.encoder, pictures.agent_size, pictures.stack, agent.n_step, action_dim, run.seed
+    )
+    return Demonstrations(config, expert, replay, inverse_dynamics, pictures.agent_size)
+
+
+def build_components(
+    run: RunConfig, environment: gymnasium.Env[Any, Any], expert: VideoSource, console: Console
+) -> Components:
     """Everything that learns or remembers; says how much memory it will take before it takes it."""
     config, pictures = run.training, run.training.pictures
     assert isinstance(environment.action_space, gymnasium.spaces.Box)
@@ -106,6 +135,7 @@ def build_components(run: RunConfig, environment: gymnasium.Env[Any, Any], conso
             config.agent.shift,
         ),
         agent_videos=AgentVideos(config.interactive.agent_videos, frames, pictures.video_size),
+        demonstrations=build_demonstrations(run, expert, action_dim),
     )
 
 
@@ -125,16 +155,18 @@ def open_demos(run: RunConfig, console: Console) -> Demos:
     expert = _open(paths["expert"], run)
     if "random" not in paths:
         console.print("no random videos beside the expert's; recording as many")
+    if "random" not in paths or not read_manifest(paths["random"]).complete:
+        paths["random"] = root / "random"
         record(
             run.task,
             "random",
             len(expert),
-            root / "random",
+            paths["random"],
             run.training.pictures,
-            seed=run.seed,
+            # The same seed draws the same starts, so no start tells expert from random.
+            seed=run.seed if expert.manifest.seed is None else expert.manifest.seed,
             episode_steps=expert.manifest.frames - 1,
         )
-        paths = find_demo_sets(root)
     held_out = min(run.training.evaluation.held_out_videos, len(expert) // 5)
     sources: dict[str, VideoSource] = {}
     kept: dict[str, list[Video]] = {}
@@ -154,18 +186,9 @@ def reference_rng(seed: int, agent_steps: int) -> np.random.Generator:
 
 
 def _open(path: Path, run: RunConfig) -> DemoSet:
-    manifest_bytes = sum(file.stat().st_size for file in path.glob("*.npy"))
-    demo_set = DemoSet.open(path, verify=manifest_bytes < _VERIFY_BELOW_BYTES)
-    manifest, pictures = demo_set.manifest, run.training.pictures
-    episode_steps = task_named(run.task).episode_steps
-    if manifest.video_size != pictures.video_size:
-        raise BootifolError(
-            f"the videos in {path} are {manifest.video_size} pixels and this run reads {pictures.video_size}: "
-            f"pass --pictures.video-size {manifest.video_size}, or make the videos again at {pictures.video_size}"
-        )
-    if manifest.frames < episode_steps + 1:
-        raise BootifolError(
-            f"the videos in {path} have {manifest.frames} frames, but an episode of {run.task} has "
-            f"{episode_steps + 1}: make longer videos"
-        )
+    shard_bytes = sum(file.stat().st_size for file in path.glob("*.npy"))
+    demo_set = DemoSet.open(path, verify=shard_bytes < _VERIFY_BELOW_BYTES)
+    found = differences(demo_set.manifest, run.task, run.training.pictures)
+    if found:
+        raise BootifolError(f"the videos in {path} do not fit this run: {'; '.join(found)}")
     return demo_set

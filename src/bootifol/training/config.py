@@ -8,6 +8,7 @@ from bootifol.agents.drqv2 import DrQv2Config
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.registry import RewardConfig
+from bootifol.training.demonstrations import DemonstrationConfig
 
 
 def _at_least(minimum: float, **fields: float) -> None:
@@ -109,6 +110,7 @@ class TrainingConfig:
     agent: DrQv2Config = field(default_factory=DrQv2Config)
     alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
     interactive: InteractiveConfig = field(default_factory=InteractiveConfig)
+    demonstrations: DemonstrationConfig = field(default_factory=DemonstrationConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
 
     threads: int = 2

@@ -21,7 +21,8 @@ from bootifol.rewards.base import RewardModel
 from bootifol.tracking import Averages
 from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.config import InteractiveConfig
-from bootifol.types import Action, Observation, VideoSource
+from bootifol.training.demonstrations import Demonstrations
+from bootifol.types import Action, Batch, Observation, VideoSource
 
 
 @dataclass
@@ -39,6 +40,8 @@ class InteractivePhase:
     """f, g, q, d."""
     agent: DrQv2
     """π, Q."""
+    demonstrations: Demonstrations | None
+    """Expert videos as experience; None, as in the paper, without them."""
     config: InteractiveConfig
     budget: Budget
     counters: Counters
@@ -85,9 +88,19 @@ class InteractivePhase:
     def _update_agent(self) -> None:
         if self._warming_up or self.counters.agent_steps % self.agent.config.update_every:
             return
-        batch = self.replay.sample(self.agent.config.batch_size, self.rng)
+        batch = self._batch(self.agent.config.batch_size)
         self.averages.add(self.agent.update(batch, self.budget.scheduled_steps(self.counters)))
         self.counters.agent_updates += 1
+
+    def _batch(self, batch_size: int) -> Batch:
+        if self.demonstrations is None:
+            return self.replay.sample(batch_size, self.rng)
+        self.averages.add(
+            self.demonstrations.refresh_if_due(
+                self.counters.agent_steps, self.replay, self.reward_model, self.rng
+            )
+        )
+        return self.demonstrations.mixed(self.replay, batch_size, self.rng)
 
     def _update_reward(self) -> None:
         if self._warming_up or self.counters.agent_steps % self.config.reward_update_every:

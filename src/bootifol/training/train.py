@@ -20,6 +20,7 @@ from bootifol.evaluation.showcase import play_showcase, write_showcase
 from bootifol.evaluation.summary import summarize
 from bootifol.evaluation.tables import append_evaluations, append_ranking
 from bootifol.experts import make_expert, make_random
+from bootifol.memory import keep_freed_memory
 from bootifol.progress import progress
 from bootifol.tasks import task_named
 from bootifol.tracking import Averages, Tracker
@@ -57,10 +58,11 @@ class Run:
         self.console = console
         config = self.run.training
         torch.set_num_threads(config.threads)
+        keep_freed_memory()
         self.task = task_named(self.run.task)
         self.demos = open_demos(self.run, self.console)
         self.environment = build_environment(self.run, self.task.episode_steps)
-        self.components = build_components(self.run, self.environment, self.console)
+        self.components = build_components(self.run, self.environment, self.demos.expert, self.console)
         self.counters = Counters()
         self.rng = np.random.default_rng([self.run.seed, 3])
         self._resume()
@@ -77,6 +79,7 @@ class Run:
             self.components.replay,
             self.components.reward_model,
             self.components.agent,
+            self.components.demonstrations,
             config.interactive,
             self.budget,
             self.counters,
@@ -255,7 +258,7 @@ class Run:
             reference_rng(self.run.seed, self.counters.agent_steps),
             self.counters.agent_steps,
         )
-        write_showcase(self.directory, episodes)
+        write_showcase(self.directory, episodes, self.environment.metadata["render_fps"])
 
     def _log(self, phase: str, count_name: str, count: int, metrics: Metrics) -> None:
         self.tracker.log(phase, count_name, count, self.counters.seconds, metrics)

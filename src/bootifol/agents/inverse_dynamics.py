@@ -1,0 +1,123 @@
+"""Inverse dynamics: which action leads from one picture to the next, learned from the agent's own steps.
+
+Applied to the expert's videos it gives the actions that they do not show. This goes beyond the paper; the idea is
+that of "Behavioral Cloning from Observation" (Torabi, Warnell, Stone, 2018), on pictures.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from bootifol.agents.networks import Encoder, EncoderName
+from bootifol.errors import BootifolError
+from bootifol.types import Arrays, Batch, Frames, Metrics
+
+
+class InverseDynamics:
+    """Predicts action `a_t` from the stacks of pictures that end at frame `t` and at frame `t + n`.
+
+    Args:
+        encoder: convolutions over both stacks.
+        frame_size: height and width of the pictures in pixels.
+        stack: pictures of a stack.
+        n_step: how far apart the two stacks are; at the end of an episode they are closer, in training and in use.
+        action_dim: action dimensions.
+        seed: of the initial parameters.
+        learning_rate: of Adam.
+        hidden_dim: width of the two hidden layers.
+    """
+
+    def __init__(
+        self,
+        encoder: EncoderName,
+        frame_size: int,
+        stack: int,
+        n_step: int,
+        action_dim: int,
+        seed: int,
+        learning_rate: float = 5e-4,
+        hidden_dim: int = 512,
+    ) -> None:
+        self.stack, self.n_step = stack, n_step
+        # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            convolutions = Encoder(encoder, 6 * stack, frame_size)
+            self.network = nn.Sequential(
+                convolutions,
+                nn.Linear(convolutions.feature_count, hidden_dim),
+                nn.LayerNorm(hidden_dim),
+                nn.ReLU(),
+                nn.Linear(hidden_dim, hidden_dim),
+                nn.ReLU(),
+                nn.Linear(hidden_dim, action_dim),
+            )
+        convolutions.to(memory_format=torch.channels_last)
+        self._optimizer = torch.optim.Adam(self.network.parameters(), learning_rate, fused=True)
+
+    def update(self, batch: Batch) -> Metrics:
+        """One gradient step on the agent's own transitions, whose two observations were shifted alike.
+
+        Returns:
+            The mean squared error of the actions.
+        """
+        loss = nn.functional.mse_loss(self._predict(batch.observation, batch.next_observation), batch.action)
+        if not torch.isfinite(loss):
+            raise BootifolError(
+                f"the loss of the inverse dynamics is {float(loss.detach())}; the step was not taken: resume from the "
+                "last checkpoint"
+            )
+        self._optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        self._optimizer.step()
+        return {"inverse_dynamics/loss": float(loss.detach())}
+
+    def actions(self, frames: Frames) -> NDArray[np.float32]:
+        """The actions `[T, A]` in [-1, 1] that a video `[T + 1, S, S, 3]` shows."""
+        steps = len(frames) - 1
+        now = np.arange(steps)[:, None]
+        back = np.arange(1 - self.stack, 1)
+        before = frames[np.maximum(now + back, 0)]
+        after = frames[np.maximum(np.minimum(now + self.n_step, steps) + back, 0)]
+        with torch.inference_mode():
+            predicted = self._predict(_stacked(before), _stacked(after)).clamp(-1.0, 1.0)
+        actions: NDArray[np.float32] = predicted.numpy()
+        return actions
+
+    def state(self) -> Arrays:
+        """Parameters and optimizer."""
+        arrays: Arrays = {}
+        for name, parameter in self.network.named_parameters():
+            arrays[name] = parameter.detach().numpy().copy()
+            for key, value in self._optimizer.state[parameter].items():
+                arrays[f"{key}/{name}"] = value.numpy().copy()
+        return arrays
+
+    def load_state(self, arrays: Arrays) -> None:
+        """Restores what `state` returned, bit for bit."""
+        for name, parameter in self.network.named_parameters():
+            with torch.no_grad():
+                parameter.copy_(torch.from_numpy(arrays[name]))
+            for key in ("step", "exp_avg", "exp_avg_sq"):
+                if f"{key}/{name}" in arrays:
+                    value = torch.from_numpy(arrays[f"{key}/{name}"].copy())
+                    if value.dim() == 4:
+                        value = value.to(memory_format=torch.channels_last)
+                    self._optimizer.state[parameter][key] = value
+
+    def _predict(self, before: Tensor, after: Tensor) -> Tensor:
+        """Actions `[B, A]` from two stacks, uint8 `[B, 3 * stack, S, S]` each."""
+        pictures = torch.cat([before, after], dim=1).to(torch.bfloat16, memory_format=torch.channels_last)
+        with torch.autocast("cpu", torch.bfloat16):
+            output: Tensor = self.network(pictures.sub_(127.5).mul_(1 / 255))
+        return output.float()
+
+
+def _stacked(frames: NDArray[np.uint8]) -> Tensor:
+    """`[T, stack, S, S, 3]` to uint8 `[T, 3 * stack, S, S]`, the oldest frame's channels first."""
+    steps, stack, height, width, _ = frames.shape
+    moved = frames.transpose(0, 1, 4, 2, 3).reshape(steps, 3 * stack, height, width)
+    return torch.from_numpy(np.ascontiguousarray(moved))
