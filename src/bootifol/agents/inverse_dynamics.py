@@ -55,7 +55,7 @@ class InverseDynamics:
                 nn.ReLU(),
                 nn.Linear(hidden_dim, action_dim),
             )
-        convolutions.to(memory_format=torch.channels_last)
+        convolutions.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._optimizer = torch.optim.Adam(self.network.parameters(), learning_rate, fused=True)
 
     def update(self, batch: Batch) -> Metrics:
