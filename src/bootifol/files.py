@@ -82,7 +82,8 @@ def read_json(path: Path, what: str) -> Any:
 def write_arrays(target: Path, arrays: Arrays) -> None:
     """Writes named arrays as one safetensors file."""
     with written_aside(target) as aside:
-        save_file({name: np.ascontiguousarray(array) for name, array in arrays.items()}, aside)
+        # Not np.ascontiguousarray, which gives numbers without a dimension one.
+        save_file({name: np.asarray(array, order="C") for name, array in arrays.items()}, aside)
 
 
 def read_arrays(path: Path, what: str) -> Arrays:

@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+import pytest
+
+from bootifol.errors import BootifolError
+from bootifol.training.budget import Budget, Counters, parse_duration
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"), [("90s", 90), ("45m", 2700), ("1.5h", 5400), ("1h30m", 5400), ("1h1m1s", 3661)]
+)
+def test_durations(text: str, seconds: float) -> None:
+    assert parse_duration(text) == seconds
+
+
+@pytest.mark.parametrize("text", ["", "90", "1d", "h", "-5m", "1h 30m"])
+def test_a_wrong_duration_gets_a_sentence(text: str) -> None:
+    with pytest.raises(BootifolError, match="is not a duration; write it like 90s"):
+        parse_duration(text)
+
+
+def test_without_a_time_budget_schedules_follow_agent_steps() -> None:
+    budget = Budget(agent_steps=1000, alignment_steps=5)
+    counters = Counters(agent_steps=400, interactive_seconds=1e9)
+    assert budget.scheduled_steps(counters) == 400
+    assert not budget.ended(counters)
+    assert budget.ended(Counters(agent_steps=1000))
+
+
+def test_with_a_time_budget_schedules_are_stretched_over_what_alignment_left() -> None:
+    budget = Budget(agent_steps=1000, seconds=100.0, alignment_steps=50, alignment_share=0.2)
+    counters = Counters(agent_steps=7, alignment_seconds=20.0, interactive_seconds=40.0)
+    assert budget.scheduled_steps(counters) == 500
+    assert not budget.ended(counters)
+    assert budget.ended(Counters(agent_steps=7, alignment_seconds=20.0, interactive_seconds=81.0))
+
+
+def test_alignment_ends_with_its_steps_or_its_share_of_the_time() -> None:
+    budget = Budget(agent_steps=1000, seconds=100.0, alignment_steps=50, alignment_share=0.2)
+    assert not budget.alignment_ended(Counters(alignment_steps=49, alignment_seconds=19.9))
+    assert budget.alignment_ended(Counters(alignment_steps=50))
+    assert budget.alignment_ended(Counters(alignment_steps=3, alignment_seconds=20.0))

@@ -1,0 +1,51 @@
+"""The environment's own reward reaches evaluation only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from tiny_runs import new_run
+
+from bootifol.envs.rollout import play_episode
+from bootifol.errors import BootifolError
+from bootifol.training import components
+
+
+class NaNReward(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """The same environment with rewards that poison whatever touches them."""
+
+    def step(self, action: Any) -> Any:
+        observation, _, terminated, truncated, info = self.env.step(action)
+        return observation, float("nan"), terminated, truncated, info
+
+
+@pytest.fixture
+def nan_rewards(monkeypatch: pytest.MonkeyPatch) -> None:
+    make = components.make_environment
+    monkeypatch.setattr(components, "make_environment", lambda *arguments: NaNReward(make(*arguments)))
+
+
+def test_nan_rewards_give_the_same_policy_bit_for_bit(
+    tmp_path: Path, demos: Path, request: pytest.FixtureRequest
+) -> None:
+    usual = new_run(tmp_path / "usual", demos)
+    assert usual.learn()
+    request.getfixturevalue("nan_rewards")
+    poisoned = new_run(tmp_path / "poisoned", demos)
+    assert np.isnan(play_episode(poisoned.environment, poisoned.interactive._act, 1, "x").environment_return)
+    poisoned = new_run(tmp_path / "again", demos)
+    assert poisoned.learn()
+    for name, component in usual.components.stateful().items():
+        theirs = poisoned.components.stateful()[name].state()
+        for key, array in component.state().items():
+            np.testing.assert_array_equal(array, theirs[key], err_msg=f"{name}: {key}")
+
+
+def test_the_upper_bound_does_read_it(tmp_path: Path, demos: Path, nan_rewards: None) -> None:
+    """The counterpart: without it, the test above could pass because nothing learns."""
+    with pytest.raises(BootifolError, match="finite"):
+        new_run(tmp_path / "run", demos, method="environment").learn()

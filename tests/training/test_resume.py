@@ -1,0 +1,153 @@
+"""A run that stops and goes on is bit for bit the run that never stopped."""
+
+from __future__ import annotations
+
+import os
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_runs import TINY, new_run, resumed
+
+from bootifol.errors import BootifolError
+from bootifol.files import read_arrays, read_json
+from bootifol.training.checkpoint import newest_checkpoint
+from bootifol.training.config import TrainingConfig
+from bootifol.training.demonstrations import DemonstrationConfig
+from bootifol.training.interactive import InteractivePhase
+from bootifol.training.train import Run
+
+WITH_DEMONSTRATIONS = replace(
+    TINY,
+    agent=replace(TINY.agent, cloning_weight=1.0),
+    demonstrations=DemonstrationConfig(
+        share=0.5, videos=4, first_updates=3, updates=1, refresh_every=60, batch_size=8
+    ),
+)
+
+
+def signal_at(monkeypatch: pytest.MonkeyPatch, number: signal.Signals, episode: int) -> None:
+    """Sends this process a signal while episode `episode` is being played."""
+    play = InteractivePhase.play_episode
+
+    def play_and_signal(self: InteractivePhase) -> None:
+        if self.counters.episodes == episode:
+            os.kill(os.getpid(), number)
+        play(self)
+
+    monkeypatch.setattr(InteractivePhase, "play_episode", play_and_signal)
+
+
+def assert_same_checkpoint(one: Path, other: Path) -> None:
+    first, second = newest_checkpoint(one / "checkpoints"), newest_checkpoint(other / "checkpoints")
+    assert first is not None and second is not None and first.name == second.name
+    for file in sorted(first.glob("*.safetensors")):
+        a, b = read_arrays(file, file.name), read_arrays(second / file.name, file.name)
+        assert a.keys() == b.keys()
+        for name in a:
+            np.testing.assert_array_equal(a[name], b[name], err_msg=f"{file.name}: {name}")
+    a, b = (read_json(path / "checkpoint.json", "") for path in (first, second))
+    assert a["random_state"] == b["random_state"]
+    seconds = {"alignment_seconds", "interactive_seconds"}
+    for name in a["counters"].keys() - seconds:
+        assert a["counters"][name] == b["counters"][name], name
+
+
+def next_actions(run: Run) -> np.ndarray:
+    observation, _ = run.environment.reset(seed=5)
+    return np.stack([run.components.agent.act(observation, 240, explore=True) for _ in range(3)])
+
+
+@pytest.mark.parametrize("config", [TINY, WITH_DEMONSTRATIONS], ids=["paper", "demonstrations"])
+def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch, config: TrainingConfig
+) -> None:
+    whole = new_run(tmp_path / "whole", demos, config=config)
+    assert whole.learn()
+
+    with monkeypatch.context() as patch:
+        signal_at(patch, signal.SIGTERM, episode=4)
+        assert not new_run(tmp_path / "parts", demos, config=config).learn()
+    rest = resumed(tmp_path / "parts")
+    assert rest.counters.episodes == 5
+    assert rest.learn()
+
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
+    np.testing.assert_array_equal(next_actions(whole), next_actions(rest))
+
+
+def test_ctrl_c_during_alignment_can_be_resumed(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = new_run(tmp_path / "whole", demos)
+    assert whole.learn()
+
+    run = new_run(tmp_path / "parts", demos)
+    step = run.components.reward_model._step
+
+    def step_and_signal(*arguments: object, **named: object) -> object:
+        os.kill(os.getpid(), signal.SIGINT)
+        return step(*arguments, **named)
+
+    monkeypatch.setattr(run.components.reward_model, "_step", step_and_signal)
+    assert not run.learn()
+    rest = resumed(tmp_path / "parts")
+    assert rest.counters.alignment_steps == 1
+    assert rest.learn()
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
+
+
+def test_metrics_written_after_the_checkpoint_are_undone(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    signal_at(monkeypatch, signal.SIGTERM, episode=3)
+    assert not new_run(tmp_path / "run", demos).learn()
+    metrics = tmp_path / "run" / "metrics.jsonl"
+    written = metrics.read_text()
+    with metrics.open("a") as file:
+        file.write('{"phase": "interactive", "agent_steps": 99999}\n')
+    resumed(tmp_path / "run")
+    assert metrics.read_text() == written
+
+
+def test_a_full_disk_during_a_checkpoint_leaves_the_last_good_one(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = new_run(tmp_path / "whole", demos)
+    assert whole.learn()
+
+    with monkeypatch.context() as patch:
+
+        def no_space(*arguments: object) -> None:
+            raise OSError(28, "No space left on device")
+
+        run = new_run(tmp_path / "parts", demos)
+        play = InteractivePhase.play_episode
+
+        def play_and_fill(self: InteractivePhase) -> None:
+            play(self)
+            if self.counters.episodes == 2:
+                patch.setattr("bootifol.files.save_file", no_space)
+                os.kill(os.getpid(), signal.SIGTERM)
+
+        patch.setattr(InteractivePhase, "play_episode", play_and_fill)
+        with pytest.raises(BootifolError, match=r"No space left on device.*train --resume"):
+            run.learn()
+
+    assert [path.name for path in (tmp_path / "parts" / "checkpoints").iterdir()] == ["000000000000-000000004"]
+    rest = resumed(tmp_path / "parts")
+    assert rest.learn()
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
+
+
+def test_a_truncated_checkpoint_is_named(tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    signal_at(monkeypatch, signal.SIGTERM, episode=1)
+    assert not new_run(tmp_path / "run", demos).learn()
+    checkpoint = newest_checkpoint(tmp_path / "run" / "checkpoints")
+    assert checkpoint is not None
+    agent = checkpoint / "agent.safetensors"
+    agent.write_bytes(agent.read_bytes()[:-100])
+    with pytest.raises(BootifolError, match=r"the checkpoint's agent is damaged or incomplete: .*agent\.safetensors"):
+        resumed(tmp_path / "run")

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from bootifol.errors import BootifolError
+from bootifol.presets import CPU, PAPER, PRESETS
+from bootifol.training.config import TrainingConfig
+from bootifol.training.run_config import RunConfig
+
+
+@pytest.mark.parametrize("preset", list(PRESETS))
+def test_a_written_configuration_rebuilds_the_run(tmp_path: Path, preset: str) -> None:
+    run = RunConfig("drawn_reach", "bootifol", preset, 3, "demos", 90.0, PRESETS[preset])  # type: ignore[index]
+    run.write(tmp_path, ["bootifol", "train"])
+    assert RunConfig.read(tmp_path) == run
+
+
+def test_an_unknown_field_is_named(tmp_path: Path) -> None:
+    RunConfig("drawn_reach", "bootifol", "cpu", 3, "demos", None, CPU).write(tmp_path, [])
+    path = tmp_path / "config.json"
+    data = json.loads(path.read_text())
+    data["config"]["agent"]["telepathy"] = 1
+    path.write_text(json.dumps(data))
+    with pytest.raises(BootifolError, match="telepathy, which this version"):
+        RunConfig.read(tmp_path)
+
+
+def test_a_directory_without_a_run_is_named(tmp_path: Path) -> None:
+    with pytest.raises(BootifolError, match="is not a run"):
+        RunConfig.read(tmp_path)
+
+
+def test_the_paper_preset_is_the_papers_table() -> None:
+    """Table "Hyperparameters" and section 3; DrQ-v2's own defaults where the paper names none."""
+    paper: TrainingConfig = PAPER
+    reward, agent = paper.reward.bootifol, paper.agent
+    assert (paper.pictures.video_size, paper.pictures.agent_size, paper.pictures.stack) == (64, 84, 3)
+    assert paper.alignment.gradient_steps == 8000
+    assert reward.videos_per_class == 16
+    assert paper.interactive.reward_updates_until == 375_000
+    assert paper.interactive.reward_update_every == 50
+    assert paper.interactive.agent_steps == 1_550_000
+    assert paper.interactive.agent_videos == 5000
+    assert reward.learning_rate == agent.learning_rate == 1e-4
+    assert (reward.reward, reward.references, reward.width_divisor, reward.frames_per_video) == ("distance", 1, 1, None)
+    assert (reward.temperature, reward.predicted_states, reward.window, reward.margin) == (0.07, 2, 2, 1.0)
+    assert (agent.batch_size, agent.n_step, agent.discount, agent.hidden_dim, agent.feature_dim) == (256, 3, 0.99, 1024, 50)
+    assert (agent.exploration_start, agent.exploration_end, agent.exploration_steps) == (1.0, 0.1, 500_000)
+    assert (agent.noise_clip, agent.target_rate, agent.update_every, agent.shift) == (0.3, 0.01, 2, 4)
+    assert (agent.replay_capacity, agent.warm_up_steps) == (100_000, 1920)
+    assert paper.demonstrations.share == 0 and agent.cloning_weight == 0

@@ -1,0 +1,56 @@
+"""Runs so small that a test can train several: the drawn task, 32-pixel pictures, the narrowest networks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from rich.console import Console
+
+from bootifol.demos.record import record
+from bootifol.envs.pictures import PictureConfig
+from bootifol.presets import SMOKE
+from bootifol.rewards.registry import RewardConfig
+from bootifol.training.config import AlignmentConfig, InteractiveConfig, TrainingConfig
+from bootifol.training.run_config import RunConfig
+from bootifol.training.train import Run
+
+PICTURES = PictureConfig(agent_size=32, video_size=32)
+
+TINY = replace(
+    SMOKE,
+    pictures=PICTURES,
+    threads=1,
+    tensorboard=False,
+    reward=RewardConfig(replace(SMOKE.reward.bootifol, width_divisor=32, videos_per_class=2)),
+    agent=replace(SMOKE.agent, encoder="strided", hidden_dim=16, batch_size=8, warm_up_steps=60, update_every=5, replay_capacity=600),
+    alignment=AlignmentConfig(gradient_steps=4, log_every=2),
+    interactive=InteractiveConfig(
+        agent_steps=240,
+        reward_update_every=40,
+        reward_updates_until=200,
+        agent_videos=6,
+        relabel_episodes=1,
+        log_every=60,
+    ),
+    evaluation=replace(SMOKE.evaluation, every=120, held_out_videos=2),
+)
+
+
+def record_demos(directory: Path) -> Path:
+    for behavior in ("expert", "random", "half_good"):
+        record("drawn_reach", behavior, 12, directory / behavior, PICTURES)
+    return directory
+
+
+def new_run(
+    directory: Path, demos: Path, method: str = "bootifol", config: TrainingConfig = TINY, seed: int = 1
+) -> Run:
+    run = RunConfig("drawn_reach", method, "smoke", seed, str(demos), None, config)
+    made = Run(run, directory, Console(quiet=True))
+    run.write(directory, ["bootifol", "train"])
+    return made
+
+
+def resumed(directory: Path) -> Run:
+    return Run(RunConfig.read(directory), directory, Console(quiet=True))
