@@ -112,7 +112,7 @@ class InverseDynamics:
         """Actions `[B, A]` from two stacks, uint8 `[B, 3 * stack, S, S]` each."""
         pictures = torch.cat([before, after], dim=1).to(torch.bfloat16, memory_format=torch.channels_last)
         with torch.autocast("cpu", torch.bfloat16):
-            output: Tensor = self.network(pictures.sub_(127.5).mul_(1 / 255))
+            output: Tensor = self.network(pictures)
         return output.float()
 
 
