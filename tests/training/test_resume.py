@@ -136,18 +136,24 @@ def test_a_full_disk_during_a_checkpoint_leaves_the_last_good_one(
         with pytest.raises(BootifolError, match=r"No space left on device.*train --resume"):
             run.learn()
 
-    assert [path.name for path in (tmp_path / "parts" / "checkpoints").iterdir()] == ["000000000000-000000004"]
+    assert [path.name for path in (tmp_path / "parts" / "checkpoints").iterdir()] == [
+        "000000000000-000000004"
+    ]
     rest = resumed(tmp_path / "parts")
     assert rest.learn()
     assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
 
 
-def test_a_truncated_checkpoint_is_named(tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_truncated_checkpoint_is_named(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     signal_at(monkeypatch, signal.SIGTERM, episode=1)
     assert not new_run(tmp_path / "run", demos).learn()
     checkpoint = newest_checkpoint(tmp_path / "run" / "checkpoints")
     assert checkpoint is not None
     agent = checkpoint / "agent.safetensors"
     agent.write_bytes(agent.read_bytes()[:-100])
-    with pytest.raises(BootifolError, match=r"the checkpoint's agent is damaged or incomplete: .*agent\.safetensors"):
+    with pytest.raises(
+        BootifolError, match=r"the checkpoint's agent is damaged or incomplete: .*agent\.safetensors"
+    ):
         resumed(tmp_path / "run")

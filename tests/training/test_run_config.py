@@ -45,9 +45,20 @@ def test_the_paper_preset_is_the_papers_table() -> None:
     assert paper.interactive.agent_steps == 1_550_000
     assert paper.interactive.agent_videos == 5000
     assert reward.learning_rate == agent.learning_rate == 1e-4
-    assert (reward.reward, reward.references, reward.width_divisor, reward.frames_per_video) == ("distance", 1, 1, None)
+    assert (reward.reward, reward.references, reward.width_divisor, reward.frames_per_video) == (
+        "distance",
+        1,
+        1,
+        None,
+    )
     assert (reward.temperature, reward.predicted_states, reward.window, reward.margin) == (0.07, 2, 2, 1.0)
-    assert (agent.batch_size, agent.n_step, agent.discount, agent.hidden_dim, agent.feature_dim) == (256, 3, 0.99, 1024, 50)
+    assert (agent.batch_size, agent.n_step, agent.discount, agent.hidden_dim, agent.feature_dim) == (
+        256,
+        3,
+        0.99,
+        1024,
+        50,
+    )
     assert (agent.exploration_start, agent.exploration_end, agent.exploration_steps) == (1.0, 0.1, 500_000)
     assert (agent.noise_clip, agent.target_rate, agent.update_every, agent.shift) == (0.3, 0.01, 2, 4)
     assert (agent.replay_capacity, agent.warm_up_steps) == (100_000, 1920)

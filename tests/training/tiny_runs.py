@@ -23,7 +23,15 @@ TINY = replace(
     threads=1,
     tensorboard=False,
     reward=RewardConfig(replace(SMOKE.reward.bootifol, width_divisor=32, videos_per_class=2)),
-    agent=replace(SMOKE.agent, encoder="strided", hidden_dim=16, batch_size=8, warm_up_steps=60, update_every=5, replay_capacity=600),
+    agent=replace(
+        SMOKE.agent,
+        encoder="strided",
+        hidden_dim=16,
+        batch_size=8,
+        warm_up_steps=60,
+        update_every=5,
+        replay_capacity=600,
+    ),
     alignment=AlignmentConfig(gradient_steps=4, log_every=2),
     interactive=InteractiveConfig(
         agent_steps=240,

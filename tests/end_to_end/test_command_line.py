@@ -1,0 +1,182 @@
+"""Every command, end to end, on the task that needs no simulator; and what bad input gets."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bootifol.cli.main import main
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.video_files import write_video
+from bootifol.training.checkpoint import newest_checkpoint
+
+SMALL = ["--agent-size", "32", "--video-size", "32"]
+SMALL_RUN = [
+    *("--task", "drawn_reach", "--preset", "smoke", "--threads", "1", "--tensorboard", "False"),
+    *("--pictures.agent-size", "32", "--pictures.video-size", "32", "--agent.encoder", "strided"),
+    *("--reward.bootifol.width-divisor", "32", "--reward.bootifol.videos-per-class", "2"),
+    *("--alignment.gradient-steps", "6", "--interactive.agent-steps", "300", "--evaluation.every", "150"),
+    *("--agent.warm-up-steps", "60", "--agent.update-every", "10", "--agent.batch-size", "8"),
+]
+
+
+@pytest.fixture(scope="module")
+def demos(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("end_to_end") / "demos"
+    record = ["demos", "record", "--task", "drawn_reach", "--episodes", "20", "--out", str(out), *SMALL]
+    assert main(record) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def run(demos: Path) -> Path:
+    out = demos.parent / "run"
+    assert main(["train", *SMALL_RUN, "--demos", str(demos), "--out", str(out)]) == 0
+    return out
+
+
+def test_demos_can_be_checked(demos: Path) -> None:
+    assert main(["demos", "check", str(demos), "--task", "drawn_reach"]) == 0
+
+
+def test_a_run_leaves_everything_it_promises(run: Path) -> None:
+    names = {path.name for path in run.iterdir()}
+    assert names >= {
+        *("config.json", "metrics.jsonl", "evaluations.csv", "ranking.csv", "showcase.safetensors"),
+        *("checkpoints", "videos", "report.html"),
+    }
+    rows = list(csv.DictReader((run / "evaluations.csv").open()))
+    assert {row["episode_steps"] for row in rows} == {"30", "60"}
+    assert max(int(row["agent_steps"]) for row in rows) == 300
+
+
+def test_evaluate_prints_returns(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["evaluate", str(run), "--episodes", "2"]) == 0
+    printed = capsys.readouterr().out
+    assert "episode 1: return" in printed and "scaled return" in printed
+
+
+def test_score_rewards_video_files_and_demo_sets(
+    run: Path, demos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frames = DemoSet.open(demos / "expert")[0].frames
+    write_video(tmp_path / "mine.mp4", frames, 10.0)
+    table = tmp_path / "rewards.csv"
+    assert (
+        main(["score", str(run), str(tmp_path / "mine.mp4"), str(demos / "half_good"), "--out", str(table)])
+        == 0
+    )
+    assert "mean reward a step" in capsys.readouterr().out
+    rows = list(csv.DictReader(table.open()))
+    mine = [float(row["reward"]) for row in rows if row["video"].endswith("mine.mp4")]
+    assert len(mine) == 30 and np.isfinite(mine).all() and max(mine) <= 0
+    assert len({row["video"] for row in rows}) == 1 + len(DemoSet.open(demos / "half_good"))
+
+
+def test_report_compares_runs(run: Path, tmp_path: Path) -> None:
+    assert main(["report", str(run), str(run), "--out", str(tmp_path / "both.html")]) == 0
+    assert (tmp_path / "both.html").stat().st_size > 10_000
+
+
+def test_an_ended_run_can_be_resumed_without_training_again(run: Path) -> None:
+    checkpoint = newest_checkpoint(run / "checkpoints")
+    assert main(["train", "--resume", str(run)]) == 0
+    assert newest_checkpoint(run / "checkpoints") == checkpoint
+
+
+def test_the_upper_bound_runs_without_alignment(demos: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    train = ["train", *SMALL_RUN, "--method", "environment", "--demos", str(demos), "--out", str(out)]
+    assert main(train) == 0
+    assert not (out / "ranking.csv").exists()
+
+
+def test_a_time_budget_ends_a_run(demos: Path, tmp_path: Path) -> None:
+    """The steps would take hours; the budget of seconds ends it, and the schedules have run to their ends."""
+    out = tmp_path / "run"
+    steps = ["--interactive.agent-steps", "10000000", "--alignment.gradient-steps", "1000000"]
+    train = ["train", *SMALL_RUN, *steps, "--demos", str(demos), "--out", str(out), "--time-budget", "4s"]
+    assert main(train) == 0
+    checkpoint = newest_checkpoint(out / "checkpoints")
+    assert checkpoint is not None
+    agent_steps, alignment_steps = map(int, checkpoint.name.split("-"))
+    assert 0 < agent_steps < 10_000_000 and 0 < alignment_steps < 1_000_000
+
+
+def test_random_videos_are_recorded_where_there_are_none(demos: Path, tmp_path: Path) -> None:
+    """As with one's own videos: only the expert's are given."""
+    mine = tmp_path / "mine"
+    videos = tmp_path / "videos"
+    expert = DemoSet.open(demos / "expert")
+    for index in range(4):
+        write_video(videos / f"{index}.mp4", expert[index].frames, 10.0)
+    imported = ["demos", "import", str(videos), "--out", str(mine), "--size", "32", "--frames", "31"]
+    assert main(imported) == 0
+    assert main(["train", *SMALL_RUN, "--demos", str(mine), "--out", str(tmp_path / "run")]) == 0
+    assert len(DemoSet.open(mine / "random")) == 4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["train"], "train needs --demos"),
+        (["train", "--task", "fly", "--demos", "x", "--out", "y"], "there is no task 'fly'"),
+        (["train", "--preset", "huge"], "there is no preset 'huge'"),
+        (["train", "--demos", "nowhere", "--out", "y"], "there is no demo set at nowhere"),
+        (["train", "--resume", "nowhere"], "nowhere is not a run"),
+        (["train", "--demos", "x", "--out", "y", "--time-budget", "soon"], "'soon' is not a duration"),
+        (
+            ["train", "--agent.discount", "2", "--demos", "x", "--out", "y"],
+            "discount must lie in [0, 1], not 2",
+        ),
+        (["evaluate", "nowhere"], "nowhere is not a run"),
+        (["score", "nowhere", "video.mp4"], "nowhere is not a run"),
+        (["report", "nowhere"], "nowhere"),
+        (["demos", "check", "nowhere"], "nowhere"),
+        (["demos", "record", "--task", "fly", "--out", "y"], "there is no task 'fly'"),
+    ],
+)
+def test_bad_input_gets_a_sentence_and_exit_code_2(
+    arguments: list[str],
+    sentence: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    try:
+        code = main(arguments)
+    except SystemExit as stopped:  # the command line parser's own way out
+        code = int(stopped.code or 0)
+    printed = capsys.readouterr()
+    assert code == 2
+    assert sentence in " ".join((printed.err + printed.out).split())
+    assert "Traceback" not in printed.err
+    assert list(tmp_path.iterdir()) == [], "nothing may be left behind"
+
+
+def test_an_existing_run_is_not_overwritten(
+    run: Path, demos: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = (run / "config.json").read_bytes()
+    assert main(["train", *SMALL_RUN, "--demos", str(demos), "--out", str(run)]) == 2
+    assert "holds a run already: go on with" in " ".join(capsys.readouterr().err.split())
+    assert (run / "config.json").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        *([], ["doctor"], ["tasks"], ["train"], ["evaluate"], ["score"], ["report"]),
+        *(["demos"], ["demos", "record"], ["demos", "import"], ["demos", "check"]),
+    ],
+    ids=" ".join,
+)
+def test_every_command_explains_itself(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main([*command, "--help"])
+    assert stopped.value.code == 0
+    assert "usage: bootifol" in capsys.readouterr().out
