@@ -166,10 +166,11 @@ def test_several_references_are_aggregated_at_every_time_step(aggregate: str) ->
     np.testing.assert_allclose(several.label(OTHER[0], references), expected, rtol=1e-3, atol=1e-6)
 
 
-def test_alignment_scale_gives_random_episodes_about_minus_one_a_step() -> None:
+def test_alignment_scale_gives_random_episodes_about_zero_a_step() -> None:
     model = aligned(60, replace(SMALL, reward_scale="alignment"))
     rewards = [model.label(OTHER[i], [EXPERT[i]]).mean() for i in range(8)]
-    assert -1.6 < np.mean(rewards) < -0.6
+    # Labels normalize with running statistics and the scale with a batch's own, so it is not exact.
+    assert -0.7 < np.mean(rewards) < 0.4
     scale = model.state()["reward_scale"].copy()
     model.update(EXPERT, OTHER)
     np.testing.assert_array_equal(model.state()["reward_scale"], scale)

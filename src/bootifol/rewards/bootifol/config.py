@@ -27,9 +27,10 @@ class BootifolConfig:
     """How soft soft_min is, in units of the reward: 0 tends to min, infinity to mean."""
 
     reward_scale: Literal["none", "alignment"] = "none"
-    """none (the paper), or alignment: rewards are divided by the mean distance, at the same time step, between
-    the expert and the other (random) videos at the end of the Alignment Phase, so that a random episode gets
-    about -1 a step whatever the encoder's units. The constant no longer changes while the agent acts."""
+    """none (the paper), or alignment: 1 - distance / c, where c is the mean distance, at the same time step, between
+    the expert and the other (random) videos at the end of the Alignment Phase. A random episode then gets about 0
+    a step and a perfect one 1, whatever the encoder's units; neither constant changes which policy is best, and c
+    no longer changes while the agent acts."""
 
     multiview_weight: float = 1.0
     """Weight of L_S."""

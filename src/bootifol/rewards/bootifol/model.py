@@ -85,7 +85,7 @@ class BootifolRewardModel:
             rewards = -torch.linalg.vector_norm(encoding[None] - compared, dim=2)
         reward = self._aggregate(rewards)
         if self.config.reward_scale == "alignment" and self._scale > 0:
-            reward = reward / self._scale
+            reward = 1 + reward / self._scale
         return reward.numpy()
 
     def embed(self, frames: Frames) -> NDArray[np.float32]:
