@@ -1,0 +1,60 @@
+"""Videos in, policy out: imitation from observation with bootstrapped contrastive learning.
+
+The same as the command line, from Python:
+
+    import bootifol
+
+    bootifol.record_demos("reacher_hard", "demos/reacher_hard", episodes=200)
+    bootifol.train("reacher_hard", "demos/reacher_hard", "runs/first", preset="cpu")
+    print(bootifol.evaluate("runs/first", episodes=10).scaled_return)
+    rewards = bootifol.score("runs/first", ["my_video.mp4"])
+    bootifol.report(["runs/first"], "report.html")
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bootifol.demos.import_videos import import_videos as import_videos
+    from bootifol.demos.record import record_demos as record_demos
+    from bootifol.errors import BootifolError as BootifolError
+    from bootifol.reports.html import report as report
+    from bootifol.training.api import continue_run as resume
+    from bootifol.training.api import evaluate_run as evaluate
+    from bootifol.training.api import score_videos as score
+    from bootifol.training.api import train_policy as train
+
+__version__ = version("bootifol")
+
+_WHERE = {
+    "import_videos": ("bootifol.demos.import_videos", "import_videos"),
+    "record_demos": ("bootifol.demos.record", "record_demos"),
+    "BootifolError": ("bootifol.errors", "BootifolError"),
+    "report": ("bootifol.reports.html", "report"),
+    "resume": ("bootifol.training.api", "continue_run"),
+    "evaluate": ("bootifol.training.api", "evaluate_run"),
+    "score": ("bootifol.training.api", "score_videos"),
+    "train": ("bootifol.training.api", "train_policy"),
+}
+"""Module and name of each public function, imported when first used: `bootifol --help` must not wait for PyTorch."""
+
+__all__ = [
+    "BootifolError",
+    "evaluate",
+    "import_videos",
+    "record_demos",
+    "report",
+    "resume",
+    "score",
+    "train",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _WHERE:
+        raise AttributeError(f"module 'bootifol' has no attribute '{name}'")
+    module, attribute = _WHERE[name]
+    return getattr(import_module(module), attribute)

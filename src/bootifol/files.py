@@ -36,11 +36,11 @@ def written_aside(target: Path) -> Iterator[Path]:
             _sync(path)
         if aside.is_dir() and target.is_dir():
             old = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.old")
-            os.replace(target, old)
-            os.replace(aside, target)
+            target.replace(old)
+            aside.replace(target)
             shutil.rmtree(old)
         else:
-            os.replace(aside, target)
+            aside.replace(target)
         _sync(target.parent)
     except (OSError, SafetensorError) as error:
         raise BootifolError(

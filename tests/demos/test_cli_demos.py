@@ -38,7 +38,7 @@ def test_check_of_another_task_says_what_to_do_and_exits_with_1(
 
 
 def test_half_good_videos_are_few(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(demos, "_HALF_GOOD_VIDEOS", 2)
+    monkeypatch.setattr(recording, "HALF_GOOD_VIDEOS", 2)
     record(tmp_path / "demos", "--behaviors", "half_good", "random")
     assert len(DemoSet.open(tmp_path / "demos" / "half_good")) == 2
     assert len(DemoSet.open(tmp_path / "demos" / "random")) == 3

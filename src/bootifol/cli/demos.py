@@ -10,8 +10,6 @@ import tyro
 from bootifol.demos.manifest import Manifest
 from bootifol.errors import BootifolError
 
-_HALF_GOOD_VIDEOS = 64
-
 
 def record(
     task: str,
@@ -48,18 +46,15 @@ def record(
         workers: Processes that record side by side; the videos are the same for any number.
     """
     # Imported here: the simulators would slow down every other command's help.
-    from bootifol.demos.record import record as record_set
+    from bootifol.demos.record import record_demos
     from bootifol.envs.pictures import PictureConfig
 
     if not behaviors:
         raise BootifolError("name at least one behavior, such as --behaviors expert random")
     pictures = PictureConfig(agent_size=agent_size, video_size=video_size, profile=profile)
     try:
-        for behavior in behaviors:
-            count = min(episodes, _HALF_GOOD_VIDEOS) if behavior == "half_good" else episodes
-            demo_set = record_set(
-                task, behavior, count, out / behavior, pictures, seed, episode_steps, workers
-            )
+        recorded = record_demos(task, out, episodes, behaviors, pictures, seed, episode_steps, workers)
+        for behavior, demo_set in recorded.items():
             print(f"{out / behavior}: {_summary(demo_set.manifest)}")
     except KeyboardInterrupt:
         print("\nstopped; run the same command again and it goes on where it stopped")

@@ -67,6 +67,51 @@ class Recording:
         return int(np.random.SeedSequence([self.seed, index]).generate_state(1)[0] >> 1)
 
 
+HALF_GOOD_VIDEOS = 64
+"""Most half-good videos of one recording: they are for measuring, not for learning."""
+
+
+def record_demos(
+    task: str,
+    out: Path | str,
+    episodes: int = 200,
+    behaviors: Sequence[Behavior] = ("expert", "random", "half_good"),
+    pictures: PictureConfig | None = None,
+    seed: int = 1,
+    episode_steps: int | None = None,
+    workers: int = 1,
+) -> dict[Behavior, DemoSet]:
+    """Records everything a run learns from, one demo set a behavior: `out/expert`, `out/random`, `out/half_good`.
+
+    Args:
+        task: name in the catalogue of tasks.
+        out: directory of the demo sets.
+        episodes: videos of each behavior (of half_good at most `HALF_GOOD_VIDEOS`).
+        behaviors: who performs.
+        pictures: sizes and render profile; 64×64 of profile fast by default, as the preset `cpu` reads them.
+        seed: every video's seed derives from it and the video's index.
+        episode_steps: agent steps of a video; the task's training episode by default.
+        workers: processes that play episodes.
+
+    Raises:
+        BootifolError: as `record`.
+    """
+    pictures = pictures or PictureConfig(agent_size=64, video_size=64)
+    return {
+        behavior: record(
+            task,
+            behavior,
+            min(episodes, HALF_GOOD_VIDEOS) if behavior == "half_good" else episodes,
+            Path(out) / behavior,
+            pictures,
+            seed,
+            episode_steps,
+            workers,
+        )
+        for behavior in behaviors
+    }
+
+
 def record(
     task: str,
     behavior: Behavior,
