@@ -1,0 +1,44 @@
+"""The ten lines of the README."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import bootifol
+from bootifol.envs.pictures import PictureConfig
+from bootifol.presets import SMOKE
+
+
+def test_the_readmes_lines_run(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    pictures = PictureConfig(agent_size=32, video_size=32)
+    config = replace(SMOKE, pictures=pictures, agent=replace(SMOKE.agent, encoder="strided"), threads=1)
+    config = replace(
+        config,
+        alignment=replace(config.alignment, gradient_steps=3),
+        interactive=replace(config.interactive, agent_steps=300),
+        tensorboard=False,
+    )
+    bootifol.record_demos("drawn_reach", tmp_path / "demos", episodes=12, pictures=pictures)
+    bootifol.train("drawn_reach", tmp_path / "demos", tmp_path / "run", preset="smoke", config=config)
+    assert isinstance(bootifol.evaluate(tmp_path / "run", episodes=1).scaled_return, float)
+    rewards = bootifol.score(tmp_path / "run", [tmp_path / "demos" / "expert"])
+    assert len(rewards) == 12
+    assert bootifol.report([tmp_path / "run"], tmp_path / "report.html").is_file()
+
+
+def test_every_public_name_exists() -> None:
+    for name in bootifol.__all__:
+        assert getattr(bootifol, name)
+    with pytest.raises(AttributeError, match="nothing_like_it"):
+        _ = bootifol.nothing_like_it
+
+
+def test_importing_the_package_does_not_import_pytorch() -> None:
+    code = "import sys, bootifol; sys.exit('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
