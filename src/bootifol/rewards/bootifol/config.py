@@ -47,6 +47,10 @@ class BootifolConfig:
     sequence_weight: float = 1.0
     """Weight of L_O."""
 
+    sequence_times: int = 1
+    """L_O is the mean over the encodings of this many prefixes, evenly spaced up to the whole video; 1, as in the
+    paper, takes the whole video alone, though rewards read the encodings of all prefixes."""
+
     temperature: float = 0.07
     """tau of the similarity h(a, b) = exp(cos(a, b) / tau)."""
 
@@ -72,6 +76,13 @@ class BootifolConfig:
     width_divisor: int = 1
     """Divides the channels of the frame encoders and the decoder; 1 is the paper's network."""
 
+    normalize_states: bool = False
+    """Beyond the paper: frame states s have mean 0 and variance 1 in every dimension, which lets L_O start to learn
+    within tens of steps instead of hundreds; false is the paper's network."""
+
+    motion: bool = False
+    """Beyond the paper: f also reads how the state changed since the frame before; false is the paper's network."""
+
     leak: float = 0.2
     """Slope of LeakyReLU below zero."""
 
@@ -82,7 +93,7 @@ class BootifolConfig:
     """bf16 computes the convolutions in bfloat16; parameters, LSTM, losses and Adam stay in float32."""
 
     def __post_init__(self) -> None:
-        for field in ("references", "predicted_states", "window", "width_divisor"):
+        for field in ("references", "sequence_times", "predicted_states", "window", "width_divisor"):
             if getattr(self, field) < 1:
                 raise BootifolError(
                     f"reward model: {field} is {getattr(self, field)}, but must be at least 1"

@@ -188,7 +188,10 @@ class BootifolRewardModel:
             )
         expert, other = encodings.chunk(2)
         if config.sequence_weight > 0:
-            terms["sequence"] = losses.sequence_loss(expert[:, -1], other[:, -1], config.temperature)
+            last = expert.shape[1] - 1
+            times = [last * (k + 1) // config.sequence_times for k in range(config.sequence_times)]
+            at_times = [losses.sequence_loss(expert[:, t], other[:, t], config.temperature) for t in times]
+            terms["sequence"] = torch.stack(at_times).mean()
 
         weights = {name: getattr(config, f"{name}_weight") for name in terms}
         total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()

@@ -1,0 +1,186 @@
+"""What each stage costs beside a plain version of the same work, in one run: `make bench`.
+
+The plain versions (`benchmarks/plain`) are fp32, written straight from the equations, and tested against ours. Inputs
+are random, both sides get the same, and the two are timed in turn, so that a busy machine slows both. Quote the
+ratios; absolute times belong to a machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import torch
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.plain.alignment import PlainBootifol
+from benchmarks.plain.drqv2 import PlainDrQv2, PlainReplay
+from bootifol.agents.drqv2 import DrQv2
+from bootifol.envs.pictures import RenderProfile
+from bootifol.memory import keep_freed_memory
+from bootifol.presets import CPU, PAPER
+from bootifol.progress import progress
+from bootifol.replay.buffer import ReplayBuffer
+from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.bootifol.model import BootifolRewardModel
+from bootifol.tasks import make_environment
+from bootifol.training.config import TrainingConfig
+from bootifol.types import Episode, FrameBatch, Video
+
+FRAMES = 61
+ACTION_DIM = 2
+CONVOLUTIONS = {
+    "paper": ((32, 3, 2), (32, 3, 1), (32, 3, 1), (32, 3, 1)),
+    "strided": ((32, 3, 2), (32, 3, 2), (32, 3, 1), (32, 3, 1)),
+    "coarse": ((32, 8, 4), (64, 4, 2), (64, 3, 1)),
+}
+
+Work = Callable[[], object]
+
+
+class RandomVideos:
+    """A source of random pixels, behind the protocol of demo sets."""
+
+    def __init__(self, count: int, size: int, rng: np.random.Generator) -> None:
+        self.frames = rng.integers(0, 256, (count, FRAMES, size, size, 3), dtype=np.uint8)
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def __getitem__(self, index: int) -> Video:
+        return Video(str(index), self.frames[index])
+
+    def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
+        return self.frames[rng.choice(len(self), count, replace=False)]
+
+
+def environment_step(config: TrainingConfig) -> tuple[Work, Work]:
+    """An agent step: the preset's render profile beside the simulator's own quality."""
+
+    def stepper(profile: RenderProfile) -> Work:
+        environment = make_environment("reacher_hard", replace(config.pictures, profile=profile), 10**9)
+        environment.reset(seed=0)
+        actions = np.random.default_rng(0).uniform(-1, 1, (1000, ACTION_DIM)).astype(np.float32)
+        taken = iter(np.resize(actions, (10**5, ACTION_DIM)))
+        return lambda: environment.step(next(taken))
+
+    return stepper(config.pictures.profile), stepper("full")
+
+
+def agent_update(config: TrainingConfig) -> tuple[Work, Work]:
+    """Sampling a batch from replay and one DrQ-v2 update."""
+    agent_config, pictures = config.agent, config.pictures
+    size, stack, batch_size = pictures.agent_size, pictures.stack, agent_config.batch_size
+    rng = np.random.default_rng(0)
+    replay = ReplayBuffer(40 * FRAMES, size, ACTION_DIM, stack, agent_config.n_step, agent_config.discount)
+    plain_replay = PlainReplay(stack, agent_config.n_step, agent_config.discount)
+    for index in range(40):
+        frames = rng.integers(0, 256, (FRAMES, size, size, 3), dtype=np.uint8)
+        actions = rng.uniform(-1, 1, (FRAMES - 1, ACTION_DIM)).astype(np.float32)
+        episode = Episode(frames, actions, Video(str(index), frames), False)
+        rewards = rng.normal(size=FRAMES - 1).astype(np.float32)
+        replay.add(episode, rewards)
+        plain_replay.add(episode, rewards)
+    agent = DrQv2(agent_config, size, stack, ACTION_DIM, 0)
+    plain = PlainDrQv2(
+        size,
+        stack,
+        ACTION_DIM,
+        agent_config.feature_dim,
+        agent_config.hidden_dim,
+        CONVOLUTIONS[agent_config.encoder],
+    )
+
+    def plain_update() -> None:
+        noise = 0.5 * torch.randn(2, batch_size, ACTION_DIM)
+        shifts = torch.randint(-agent_config.shift, agent_config.shift + 1, (2, batch_size, 2))
+        plain.update(plain_replay.sample(batch_size, rng), noise[0], noise[1], shifts, agent_config.shift)
+
+    return lambda: agent.update(replay.sample(batch_size, rng), 0), plain_update
+
+
+def alignment_step(config: TrainingConfig, reward: BootifolConfig) -> tuple[Work, Work]:
+    """One gradient step of the reward on n expert and n other videos, every loss on every frame on both sides."""
+    rng = np.random.default_rng(0)
+    videos = RandomVideos(2 * reward.videos_per_class, config.pictures.video_size, rng)
+    same_work = replace(reward, frames_per_video=None, frame_drop=0.0, sequence_times=1)
+    model = BootifolRewardModel(same_work, config.pictures.video_size, 0)
+    plain = PlainBootifol(reward.width_divisor)
+    n = reward.videos_per_class
+    return (
+        lambda: model.update(videos, videos),
+        lambda: plain.alignment_step(videos.sample(n, rng), videos.sample(n, rng)),
+    )
+
+
+def label_episode(config: TrainingConfig, reward: BootifolConfig) -> tuple[Work, Work]:
+    """Rewarding an episode of 61 frames against one expert video whose encoding is not cached yet."""
+    rng = np.random.default_rng(0)
+    videos = RandomVideos(2, config.pictures.video_size, rng)
+    one_reference = replace(reward, references=1, aggregate="mean")
+    model = BootifolRewardModel(one_reference, config.pictures.video_size, 0)
+    plain = PlainBootifol(reward.width_divisor)
+    names = iter(range(10**9))
+
+    def label() -> None:
+        model.label(videos[0], [Video(f"never seen {next(names)}", videos.frames[1])])
+
+    return label, lambda: plain.label(videos.frames[0], videos.frames[1])
+
+
+def medians(ours: Work, plain: Work, runs: int, warm_up: int) -> tuple[float, float]:
+    """Median milliseconds of both, timed in turn."""
+    times: tuple[list[float], list[float]] = ([], [])
+    for run in range(runs + warm_up):
+        for work, kept in zip((ours, plain), times, strict=True):
+            started = time.perf_counter()
+            work()
+            if run >= warm_up:
+                kept.append(1e3 * (time.perf_counter() - started))
+    return statistics.median(times[0]), statistics.median(times[1])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--threads", type=int, default=torch.get_num_threads())
+    parser.add_argument(
+        "--runs", type=int, default=3, help="timed runs of the slow stages; quick ones get more"
+    )
+    parser.add_argument("--sizes", nargs="+", choices=["paper", "cpu"], default=["paper", "cpu"])
+    arguments = parser.parse_args()
+    keep_freed_memory()
+    torch.set_num_threads(arguments.threads)
+    table = Table(
+        "sizes", "stage", "ours ms", "plain ms", "plain / ours", title=f"{arguments.threads} thread(s)"
+    )
+    presets = {"paper": PAPER, "cpu": CPU}
+    with progress("timing", total=4 * len(arguments.sizes)) as advance:
+        for name in arguments.sizes:
+            config = presets[name]
+            # bf16 is ours to use at the paper's sizes too; the plain version is fp32 by definition.
+            reward = replace(config.reward.bootifol, precision="bf16")
+            stages: list[tuple[str, Callable[[], tuple[Work, Work]], int]] = [
+                (
+                    "agent step of the environment (plain: full quality)",
+                    partial(environment_step, config),
+                    50,
+                ),
+                ("sample and RL update", partial(agent_update, config), arguments.runs + 2),
+                ("alignment step", partial(alignment_step, config, reward), arguments.runs),
+                ("label an episode of 61 frames", partial(label_episode, config, reward), arguments.runs + 2),
+            ]
+            for stage, make, runs in stages:
+                ours, plain = medians(*make(), runs, warm_up=1)
+                table.add_row(name, stage, f"{ours:.1f}", f"{plain:.1f}", f"{plain / ours:.1f}")
+                advance(1)
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()
