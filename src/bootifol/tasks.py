@@ -45,6 +45,12 @@ def _drawn_reach(pictures: PictureConfig) -> Simulator:
     return DrawnReach(pictures)
 
 
+def _drawn_home(pictures: PictureConfig) -> Simulator:
+    from bootifol.envs.drawn import DrawnReach
+
+    return DrawnReach(pictures, fixed_target=(0.45, -0.3))
+
+
 # The returns were measured with `bootifol tasks --measure 50`.
 TASKS = {
     task.name: task
@@ -70,6 +76,17 @@ TASKS = {
             evaluation_steps=60,
             expert_return=52.4,
             random_return=2.8,
+        ),
+        Task(
+            name="drawn_home",
+            suite="drawn with numpy",
+            description="the same with the disc always in one place: learned in minutes",
+            make_simulator=_drawn_home,
+            action_repeat=1,
+            episode_steps=30,
+            evaluation_steps=60,
+            expert_return=52.4,
+            random_return=3.2,
         ),
     )
 }

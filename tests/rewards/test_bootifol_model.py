@@ -243,7 +243,7 @@ def test_mistakes_are_refused_with_a_sentence() -> None:
     model = make()
     with pytest.raises(BootifolError, match="reads uint8 videos of 32x32 RGB frames"):
         model.label(Video("large", np.zeros((5, 64, 64, 3), np.uint8)), [EXPERT[0]])
-    with pytest.raises(BootifolError, match="wants 1 reference videos, but was given 0"):
+    with pytest.raises(BootifolError, match="compares with 1 to 1 reference videos, but was given 0"):
         model.label(OTHER[0], [])
     with pytest.raises(BootifolError, match="short has 5 frames, fewer than the 12 of other-0"):
         model.label(OTHER[0], [Video("short", EXPERT[0].frames[:5])])

@@ -26,12 +26,14 @@ class DrawnReach:
 
     Args:
         pictures: size of the picture; the render profile makes no difference.
+        fixed_target: center of the target in every episode; None draws one for each.
     """
 
     action_dim = 2
     step_seconds = 0.1
 
-    def __init__(self, pictures: PictureConfig) -> None:
+    def __init__(self, pictures: PictureConfig, fixed_target: tuple[float, float] | None = None) -> None:
+        self._fixed_target = fixed_target
         self._size = pictures.picture_size
         self._background = np.full((self._size, self._size, 3), BACKGROUND, np.uint8)
         self._pixels = np.arange(self._size) + 0.5
@@ -42,7 +44,8 @@ class DrawnReach:
 
     def reset(self, seed: int) -> None:
         rng = np.random.default_rng(seed)
-        self.target = rng.uniform(-0.75, 0.75, 2)
+        drawn = rng.uniform(-0.75, 0.75, 2)
+        self.target = drawn if self._fixed_target is None else np.array(self._fixed_target)
         self.dot = rng.uniform(-0.9, 0.9, 2)
         while self._distance() < 0.5:
             self.dot = rng.uniform(-0.9, 0.9, 2)

@@ -56,17 +56,8 @@ class RankingScores:
 
 
 def draw_references(model: RewardModel, expert: VideoSource, rng: np.random.Generator) -> list[Video]:
-    """As many different expert videos as one call of `label` wants.
-
-    Raises:
-        BootifolError: there are fewer expert videos than that.
-    """
-    if model.reference_count > len(expert):
-        raise BootifolError(
-            f"the reward compares each episode with {model.reference_count} expert videos, but there are "
-            f"only {len(expert)}; record or import more"
-        )
-    drawn = rng.choice(len(expert), size=model.reference_count, replace=False)
+    """As many different expert videos as one call of `label` wants, or all where there are fewer."""
+    drawn = rng.choice(len(expert), size=min(model.reference_count, len(expert)), replace=False)
     return [expert[int(index)] for index in drawn]
 
 

@@ -72,7 +72,7 @@ def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Contr
             return reacher.torques(physics, reacher.target_position(physics) if goal is None else goal)
 
         return reach, lambda rng: reacher.wrong_place(reacher.target_position(physics), rng)
-    if task_name == "drawn_reach":
+    if task_name in ("drawn_reach", "drawn_home"):
 
         def move(goal: NDArray[np.float64] | None) -> Action:
             return drawn_reach.move(simulator.dot, simulator.target if goal is None else goal)

@@ -33,7 +33,7 @@ class RewardModel(Protocol):
 
         Args:
             video: frames `[T + 1, H, W, 3]`.
-            references: `reference_count` expert videos of at least `T + 1` frames.
+            references: `reference_count` expert videos of at least `T + 1` frames; fewer where there are fewer.
 
         Returns:
             float32 `[T]`; entry `t` depends on frames `0 … t + 1` only.

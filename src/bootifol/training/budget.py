@@ -77,6 +77,18 @@ class Budget:
         available = max(self.seconds - counters.alignment_seconds, 1e-9)
         return min(int(self.agent_steps * counters.interactive_seconds / available), self.agent_steps)
 
+    def alignment_extent(self, counters: Counters) -> tuple[str, int, int]:
+        """What the Alignment Phase counts, how much is done, and how much there is: gradient steps or seconds."""
+        if self.seconds is None:
+            return "gradient steps", counters.alignment_steps, self.alignment_steps
+        return "seconds", int(counters.alignment_seconds), round(self.alignment_share * self.seconds)
+
+    def interactive_extent(self, counters: Counters) -> tuple[str, int, int]:
+        """The same of the Interactive Phase: agent steps or seconds."""
+        if self.seconds is None:
+            return "agent steps", counters.agent_steps, self.agent_steps
+        return "seconds", int(counters.interactive_seconds), round(self.seconds - counters.alignment_seconds)
+
     def ended(self, counters: Counters) -> bool:
         return self.scheduled_steps(counters) >= self.agent_steps
 

@@ -121,7 +121,8 @@ class Run:
         averages = Averages()
         model = self.components.reward_model
         shown = {"loss": float("nan")}
-        with progress("aligning the reward", config.gradient_steps, self.counters.alignment_steps) as advance:
+        unit, done, total = self.budget.alignment_extent(self.counters)
+        with progress(f"aligning the reward ({unit})", total, done) as advance:
             for metrics in alignment_phase(
                 model, self.demos.expert, self.demos.random, self.budget, self.counters
             ):
@@ -130,7 +131,9 @@ class Run:
                     means = averages.pop()
                     shown["loss"] = means.get("loss/total", float("nan"))
                     self._log("alignment", "gradient_step", self.counters.alignment_steps, means)
-                advance(1, **shown)
+                _, now, _ = self.budget.alignment_extent(self.counters)
+                advance(min(now, total) - done, **shown)
+                done = min(now, total)
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()
@@ -139,30 +142,32 @@ class Run:
         return True
 
     def _interact(self, interruption: Interruption) -> bool:
-        config = self.run.training
+        config, counters = self.run.training, self.counters
         self.interactive.start_clock()
-        next_log = self.counters.agent_steps + config.interactive.log_every
-        with progress(
-            "agent steps", config.interactive.agent_steps, self.budget.scheduled_steps(self.counters)
-        ) as advance:
-            while not self.budget.ended(self.counters):
-                before = self.budget.scheduled_steps(self.counters)
+        unit, done, total = self.budget.interactive_extent(counters)
+        with progress(f"acting and learning ({unit})", total, done) as advance:
+            while not self.budget.ended(counters):
+                logged = counters.agent_steps // config.interactive.log_every
                 self.interactive.play_episode()
-                if self.counters.agent_steps >= next_log:
-                    next_log += config.interactive.log_every
+                if counters.agent_steps // config.interactive.log_every > logged:
                     self._log(
-                        "interactive",
-                        "agent_steps",
-                        self.counters.agent_steps,
-                        self.interactive.averages.pop(),
+                        "interactive", "agent_steps", counters.agent_steps, self.interactive.averages.pop()
                     )
-                if self.counters.agent_steps // config.evaluation.every > self.counters.evaluations:
-                    self.counters.evaluations = self.counters.agent_steps // config.evaluation.every
+                if counters.agent_steps // config.evaluation.every > counters.evaluations:
+                    counters.evaluations = counters.agent_steps // config.evaluation.every
                     self._evaluate_while_training()
-                advance(self.budget.scheduled_steps(self.counters) - before, **self._shown())
+                _, now, _ = self.budget.interactive_extent(counters)
+                advance(min(now, total) - done, **self._shown())
+                done = min(now, total)
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()
+        frames = counters.agent_steps * self.task.action_repeat
+        self.console.print(
+            f"{counters.agent_steps:,} agent steps ({frames:,} environment frames), {counters.agent_updates:,} "
+            f"updates of the agent and {counters.reward_updates:,} of the reward, after "
+            f"{counters.alignment_steps:,} of alignment"
+        )
         self._checkpoint()
         return True
 
@@ -266,7 +271,7 @@ class Run:
     def _shown(self) -> dict[str, float]:
         """What stands beside the progress bar."""
         short = {name.removeprefix("evaluation/"): value for name, value in self._last_evaluation.items()}
-        return {"episodes": self.counters.episodes, **short}
+        return {"agent_steps": self.counters.agent_steps, **short}
 
     def _resume(self) -> None:
         checkpoint = newest_checkpoint(self.directory / "checkpoints")

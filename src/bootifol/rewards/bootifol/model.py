@@ -63,9 +63,10 @@ class BootifolRewardModel:
 
         Encodings of the references are kept until the encoders change.
         """
-        if len(references) != self.reference_count:
+        if not 1 <= len(references) <= self.reference_count:
             raise BootifolError(
-                f"the reward model wants {self.reference_count} reference videos, but was given {len(references)}"
+                f"the reward model compares with 1 to {self.reference_count} reference videos, but was given "
+                f"{len(references)}"
             )
         length = len(video.frames)
         for reference in references:

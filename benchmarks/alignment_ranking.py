@@ -1,0 +1,91 @@
+"""How soon does the reward rank unseen videos? Alignment alone, variants at equal gradient steps.
+
+    python -m benchmarks.alignment_ranking --demos demos/reacher_hard --steps 200 --out results/alignment_ranking.csv
+
+Held-out expert, half-good and random videos are rewarded against eight expert videos as the preset `cpu` does. AUC is
+the chance that a better video is rewarded above a worse one (0.5: a coin).
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from rich.console import Console
+
+from bootifol.demos.demo_set import DemoSet
+from bootifol.evaluation.ranking import KINDS, rank_videos, ranking_scores
+from bootifol.files import written_aside
+from bootifol.memory import keep_freed_memory
+from bootifol.presets import CPU
+from bootifol.progress import progress
+from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.bootifol.model import BootifolRewardModel
+
+FULL = CPU.reward.bootifol
+PLAIN = replace(FULL, motion=False, normalize_states=False, sequence_times=1)
+VARIANTS: dict[str, BootifolConfig] = {
+    "cpu": FULL,
+    "cpu without motion": replace(FULL, motion=False),
+    "cpu without sequence_times": replace(FULL, sequence_times=1),
+    "cpu without normalize_states": replace(FULL, normalize_states=False),
+    "the paper's network": PLAIN,
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--demos", type=Path, required=True)
+    parser.add_argument("--steps", type=int, default=200, help="gradient steps of each variant")
+    parser.add_argument("--every", type=int, default=50, help="gradient steps between two measurements")
+    parser.add_argument("--held-out", type=int, default=32)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--out", type=Path, required=True)
+    arguments = parser.parse_args()
+    keep_freed_memory()
+    torch.set_num_threads(arguments.threads)
+    sources, held_out = {}, {}
+    for kind in KINDS:
+        sources[kind], aside = DemoSet.open(arguments.demos / kind).split(arguments.held_out)
+        held_out[kind] = [aside[index] for index in range(len(aside))]
+    rows: list[dict[str, object]] = []
+    with progress("aligning", total=len(VARIANTS) * arguments.steps) as advance:
+        for name, config in VARIANTS.items():
+            model = BootifolRewardModel(config, held_out["expert"][0].frames.shape[1], arguments.seed)
+            steps = model.align(sources["expert"], sources["random"])
+            recent: list[float] = []
+            for step in range(1, arguments.steps + 1):
+                recent.append(next(steps)["loss/sequence"])
+                advance(1)
+                if step % arguments.every:
+                    continue
+                ranked = rank_videos(
+                    model, held_out, sources["expert"], np.random.default_rng(arguments.seed), agent_steps=0
+                )
+                scores = ranking_scores(ranked)
+                rows.append(
+                    {
+                        "variant": name,
+                        "gradient_step": step,
+                        "sequence_loss": round(float(np.mean(recent[-arguments.every :])), 4),
+                        "kendall_tau": round(scores.kendall_tau, 4),
+                        "expert_above_half_good": round(scores.expert_above_half_good, 4),
+                        "half_good_above_random": round(scores.half_good_above_random, 4),
+                    }
+                )
+                Console().print(rows[-1])
+                with written_aside(arguments.out) as aside_path, aside_path.open("w", newline="") as file:
+                    writer = csv.DictWriter(file, rows[0].keys())
+                    writer.writeheader()
+                    writer.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()
