@@ -29,7 +29,7 @@ demo: .venv/ready
 
 # Lint, types, all tests.
 test: check
-	$(BIN)/python -m pytest
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 check: .venv/ready
 	$(BIN)/ruff check $(SOURCES)
