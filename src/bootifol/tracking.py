@@ -41,6 +41,7 @@ class Tracker:
     """
 
     def __init__(self, directory: Path, tensorboard: bool = True) -> None:
+        directory.mkdir(parents=True, exist_ok=True)
         self.path = directory / "metrics.jsonl"
         self._file = self.path.open("a")
         self._writer = SummaryWriter(str(directory / "tensorboard")) if tensorboard else None
