@@ -31,7 +31,6 @@ CPU = TrainingConfig(
             frames_per_video=4,
             precision="bf16",
             learning_rate=1e-3,
-            normalize_states=True,
             motion=True,
             sequence_times=6,
             references=8,
@@ -56,7 +55,7 @@ CPU = TrainingConfig(
 """The same algorithm with smaller networks, pictures and counts: a run ends within 3 hours on 2 cores and 8 GB.
 
 Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
-`normalize_states`, `motion`, `sequence_times` and `references` of the reward model, each described at its field.
+`motion`, `sequence_times` and `references` of the reward model, each described at its field.
 """
 
 DEMO = replace(
