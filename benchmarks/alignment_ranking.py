@@ -26,14 +26,13 @@ from bootifol.progress import progress
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 
-FULL = CPU.reward.bootifol
-PLAIN = replace(FULL, motion=False, normalize_states=False, sequence_times=1)
+FULL = replace(CPU.reward.bootifol, motion=True, sequence_times=6, normalize_states=True)
 VARIANTS: dict[str, BootifolConfig] = {
-    "cpu": FULL,
-    "cpu without motion": replace(FULL, motion=False),
-    "cpu without sequence_times": replace(FULL, sequence_times=1),
-    "cpu without normalize_states": replace(FULL, normalize_states=False),
-    "the paper's network": PLAIN,
+    "all three": FULL,
+    "without motion": replace(FULL, motion=False),
+    "without sequence_times": replace(FULL, sequence_times=1),
+    "without normalize_states (preset cpu)": replace(FULL, normalize_states=False),
+    "none: the paper's network": replace(FULL, motion=False, normalize_states=False, sequence_times=1),
 }
 
 

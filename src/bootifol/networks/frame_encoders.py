@@ -86,8 +86,7 @@ class FrameEncoder(nn.Module):
         width_divisor: divides the channels of the hidden layers.
         leak: slope of LeakyReLU below zero.
         normalize: beyond the paper: brings each of the 128 numbers to mean 0 and variance 1 (BatchNorm without
-            parameters). Frames of one scene differ little, so their states share a large constant part, which hides
-            the difference from every cosine and from the LSTM.
+            parameters).
     """
 
     def __init__(
