@@ -21,7 +21,7 @@ def test_reacher_hard_is_the_papers_task() -> None:
 
 
 def test_an_unknown_task_is_refused_with_the_names_there_are() -> None:
-    with pytest.raises(BootifolError, match="no task 'reacher'; the tasks are reacher_hard, drawn_reach"):
+    with pytest.raises(BootifolError, match=r"no task 'reacher'; the tasks are .*reacher_hard"):
         task_named("reacher")
     with pytest.raises(BootifolError, match="bootifol tasks"):
         make_environment("", PictureConfig(), 1)

@@ -118,6 +118,7 @@ def test_tasks_measures_expert_and_random_on_evaluation_episodes(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delitem(TASKS, "reacher_hard")
+    monkeypatch.delitem(TASKS, "drawn_home")
     assert main(["tasks", "--measure", "3"]) == 0
     captured = capsys.readouterr()
     assert "drawn_reach, expert: 3/3" in captured.err

@@ -12,7 +12,7 @@ from bootifol.tasks import TASKS, make_environment
 def fingerprints(another_episode_first: bool) -> list[str]:
     """One line an episode of every task; environments are left open on purpose."""
     lines = []
-    for task in TASKS:
+    for task in sorted(TASKS):
         environment = make_environment(task, PictureConfig(agent_size=24, video_size=16), 6)
         if another_episode_first:
             play_episode(environment, make_behavior("random", task, environment, 8), 8, "another")
