@@ -52,7 +52,7 @@ CPU = TrainingConfig(
     ),
     evaluation=EvaluationConfig(every=20_000, final_episodes=50),
 )
-"""The same algorithm with smaller networks, pictures and counts: a run ends within 3 hours on 2 cores and 8 GB.
+"""The same algorithm with smaller networks, pictures and counts: meant for 3 hours on 2 cores and 8 GB.
 
 Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
 `motion`, `sequence_times` and `references` of the reward model, each described at its field.
