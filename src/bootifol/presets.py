@@ -38,16 +38,17 @@ CPU = TrainingConfig(
         )
     ),
     agent=DrQv2Config(
-        encoder="coarse",
+        encoder="strided",
         hidden_dim=512,
         batch_size=128,
-        exploration_steps=100_000,
+        exploration_steps=60_000,
+        saturation_weight=0.01,
         replay_capacity=100_000,
     ),
     alignment=AlignmentConfig(gradient_steps=1500),
     interactive=InteractiveConfig(
-        agent_steps=500_000,
-        reward_updates_until=250_000,
+        agent_steps=300_000,
+        reward_updates_until=150_000,
         agent_videos=1500,
     ),
     evaluation=EvaluationConfig(every=20_000, final_episodes=50),

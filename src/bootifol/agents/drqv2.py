@@ -22,6 +22,9 @@ from bootifol.types import Action, Arrays, Batch, Metrics, Observation
 
 Precision = Literal["bf16", "fp32"]
 
+SATURATED = 0.98
+"""Mean actions beyond this are counted as saturated in the metrics."""
+
 
 @dataclass(frozen=True)
 class DrQv2Config:
@@ -77,6 +80,10 @@ class DrQv2Config:
     shift: int = 4
     """Largest random shift of the pictures in pixels."""
 
+    saturation_weight: float = 0.0
+    """Beyond DrQ-v2: weight of `saturation_loss` beside the actor's; 0, as in its paper, leaves it out. Where tanh is
+    saturated no gradient passes, and an actor that early estimates sent into a corner never comes back."""
+
     cloning_weight: float = 0.0
     """Beyond the paper: how strongly the actor is pulled to the inferred actions of expert videos, relative to the
     size of Q; 0, as in the paper, not at all. Needs `demonstrations`."""
@@ -103,6 +110,7 @@ class DrQv2Config:
             "exploration_end",
             "exploration_steps",
             "noise_clip",
+            "saturation_weight",
             "cloning_weight",
             "warm_up_steps",
             "shift",
@@ -136,6 +144,11 @@ def critic_loss(q1: Tensor, q2: Tensor, target: Tensor) -> Tensor:
 def actor_loss(q1: Tensor, q2: Tensor) -> Tensor:
     """Minus the mean of the smaller estimate (DrQ-v2, equation 2)."""
     return -torch.minimum(q1, q2).mean()
+
+
+def saturation_loss(before_tanh: Tensor) -> Tensor:
+    """Mean square of the actor's outputs `[B, A]` before tanh (as in MR.Q: Fujimoto et al., 2025, equation 19)."""
+    return before_tanh.square().mean()
 
 
 def cloning_loss(action: Tensor, demonstrated_action: Tensor, q: Tensor) -> Tensor:
@@ -272,8 +285,11 @@ class DrQv2:
             trunk = self.critic.trunk(features)
         metrics = {}
         with self._autocast():
-            mean_action = self.actor(features)
+            before_tanh = self.actor.before_tanh(features)
+            mean_action = torch.tanh(before_tanh)
             loss_of_actor = actor_loss(*self.critic.value(trunk, self._noisy(mean_action, stddev)))
+        if self.config.saturation_weight > 0:
+            loss_of_actor = loss_of_actor + self.config.saturation_weight * saturation_loss(before_tanh)
         if self.config.cloning_weight > 0 and batch.demonstrated is not None:
             rows = batch.demonstrated
             loss_of_cloning = cloning_loss(mean_action[rows], action[rows], q1)
@@ -292,6 +308,7 @@ class DrQv2:
             "agent/target": float(target.mean()),
             "agent/batch_reward": float(reward.mean()),
             "agent/exploration": stddev,
+            "agent/saturated": float((mean_action.detach().abs() > SATURATED).float().mean()),
         }
 
     def state(self) -> Arrays:

@@ -94,7 +94,12 @@ class Actor(nn.Module):
         self.policy = Head(feature_dim, hidden_dim, action_dim)
 
     def forward(self, features: Tensor) -> Tensor:
-        return torch.tanh(self.policy(self.trunk(features)))
+        return torch.tanh(self.before_tanh(features))
+
+    def before_tanh(self, features: Tensor) -> Tensor:
+        """Mean action before it is squashed, `[B, A]`."""
+        output: Tensor = self.policy(self.trunk(features))
+        return output
 
 
 class Critic(nn.Module):

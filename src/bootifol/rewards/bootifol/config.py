@@ -27,10 +27,9 @@ class BootifolConfig:
     """How soft soft_min is, in units of the reward: 0 tends to min, infinity to mean."""
 
     reward_scale: Literal["none", "alignment"] = "none"
-    """none (the paper), or alignment: 1 - distance / c, where c is the mean distance, at the same time step, between
+    """none (the paper), or alignment: 1 - distance / c_t, where c_t is the mean distance at time step t between
     the expert and the other (random) videos at the end of the Alignment Phase. A random episode then gets about 0
-    a step and a perfect one 1, whatever the encoder's units; neither constant changes which policy is best, and c
-    no longer changes while the agent acts."""
+    at every step and a perfect one 1, whatever the encoder's units and however distances grow with time."""
 
     multiview_weight: float = 1.0
     """Weight of L_S."""

@@ -14,11 +14,9 @@ from bootifol.rewards.bootifol import losses
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.networks import BootifolNetworks
 from bootifol.rewards.bootifol.sampling import Draw, draw
+from bootifol.rewards.bootifol.scale import DistanceScale
 from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
 from bootifol.types import Arrays, FrameBatch, Frames, Metrics, Rewards, Video, VideoSource
-
-SCALE_MEMORY = 0.98
-"""The scale of `reward_scale: alignment` is an exponential average over about the last 50 alignment steps."""
 
 
 class BootifolRewardModel:
@@ -46,7 +44,7 @@ class BootifolRewardModel:
         self.networks.to(self.device)
         self._optimizer = torch.optim.Adam(self.networks.parameters(), lr=config.learning_rate, fused=True)
         self._rng = np.random.default_rng(seed)
-        self._scale = 0.0
+        self._scale = DistanceScale()
         self._encodings: dict[str, torch.Tensor] = {}
 
     def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
@@ -56,7 +54,7 @@ class BootifolRewardModel:
 
     def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:
         """Interactive Phase: the same gradient step, with the agent's own videos as the other class."""
-        return self._step(expert, agent, scaling=self._scale == 0.0)
+        return self._step(expert, agent, scaling=not self._scale.known)
 
     def label(self, video: Video, references: Sequence[Video]) -> Rewards:
         """`r_{t+1} = -||f(o_{0:t+1}) - f(o_{e,0:t+1})||` (Algorithm 1), or the cosine of the two.
@@ -85,8 +83,8 @@ class BootifolRewardModel:
         else:
             rewards = -torch.linalg.vector_norm(encoding[None] - compared, dim=2)
         reward = self._aggregate(rewards)
-        if self.config.reward_scale == "alignment" and self._scale > 0:
-            reward = 1 + reward / self._scale
+        if self.config.reward_scale == "alignment" and self._scale.known:
+            reward = self._scale.rewards(reward)
         return reward.numpy()
 
     def embed(self, frames: Frames) -> NDArray[np.float32]:
@@ -100,7 +98,7 @@ class BootifolRewardModel:
             **module_state(self.networks, self._optimizer),
             "random": generator_array(self._rng),
             "version": np.array([self.version], dtype=np.int64),
-            "reward_scale": np.array([self._scale], dtype=np.float64),
+            "reward_scale": self._scale.means.copy(),
         }
 
     def load_state(self, arrays: Arrays) -> None:
@@ -112,7 +110,7 @@ class BootifolRewardModel:
         load_module_state(self.networks, self._optimizer, arrays)
         load_generator(self._rng, arrays["random"])
         self.version = int(arrays["version"][0])
-        self._scale = float(arrays["reward_scale"][0])
+        self._scale.means = arrays["reward_scale"].copy()
         self._encodings.clear()
 
     def _step(self, expert: VideoSource, other: VideoSource, scaling: bool) -> Metrics:
@@ -125,7 +123,7 @@ class BootifolRewardModel:
         drawn = draw(self.config, 2 * n, length, self._rng)
         statistics = [buffer.clone() for buffer in self.networks.buffers()]
         self._optimizer.zero_grad(set_to_none=True)
-        total, metrics, distance = self._losses(videos[:, drawn.kept], drawn)
+        total, metrics, distances = self._losses(videos[:, drawn.kept], drawn)
         try:
             _refuse_if_not_finite(metrics["loss/total"], self.version, metrics)
             total.backward()  # type: ignore[no-untyped-call]
@@ -140,15 +138,14 @@ class BootifolRewardModel:
         self.version += 1
         self._encodings.clear()
         if scaling:
-            first = self._scale == 0.0
-            self._scale = distance if first else SCALE_MEMORY * self._scale + (1 - SCALE_MEMORY) * distance
+            self._scale.observe(drawn.kept, distances)
         return metrics
 
-    def _losses(self, videos: FrameBatch, drawn: Draw) -> tuple[torch.Tensor, dict[str, float], float]:
+    def _losses(self, videos: FrameBatch, drawn: Draw) -> tuple[torch.Tensor, dict[str, float], NDArray[np.float64]]:
         """L and its terms on n expert videos followed by n others, uint8 `[2n, T' + 1, H, W, 3]`.
 
         Returns:
-            L; the metrics; the mean distance of expert and other encodings at the same time step.
+            L; the metrics; the mean distance of expert and other encodings at each kept frame, `[T' + 1]`.
         """
         config = self.config
         count, length = videos.shape[:2]
@@ -197,12 +194,12 @@ class BootifolRewardModel:
         weights = {name: getattr(config, f"{name}_weight") for name in terms}
         total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
         with torch.no_grad():
-            distance = float(torch.linalg.vector_norm(expert - other, dim=2).mean())
+            distances = torch.linalg.vector_norm(expert - other, dim=2).mean(0).double().cpu().numpy()
         metrics = {f"loss/{name}": float(term.detach()) for name, term in terms.items()}
         return (
             total,
-            {**metrics, "loss/total": float(total.detach()), "distance/expert_other": distance},
-            distance,
+            {**metrics, "loss/total": float(total.detach()), "distance/expert_other": float(distances.mean())},
+            distances,
         )
 
     def _encode(self, videos: Sequence[Frames]) -> list[torch.Tensor]:
