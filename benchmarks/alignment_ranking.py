@@ -26,13 +26,11 @@ from bootifol.progress import progress
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 
-FULL = replace(CPU.reward.bootifol, motion=True, sequence_times=6, normalize_states=True)
 VARIANTS: dict[str, BootifolConfig] = {
-    "all three": FULL,
-    "without motion": replace(FULL, motion=False),
-    "without sequence_times": replace(FULL, sequence_times=1),
-    "without normalize_states (preset cpu)": replace(FULL, normalize_states=False),
-    "none: the paper's network": replace(FULL, motion=False, normalize_states=False, sequence_times=1),
+    "preset cpu": CPU.reward.bootifol,
+    "without motion": replace(CPU.reward.bootifol, motion=False),
+    "without sequence_times": replace(CPU.reward.bootifol, sequence_times=1),
+    "without both: the paper's network": replace(CPU.reward.bootifol, motion=False, sequence_times=1),
 }
 
 

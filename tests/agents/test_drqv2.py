@@ -16,6 +16,7 @@ from bootifol.agents.drqv2 import (
     critic_loss,
     critic_target,
     noisy_action,
+    saturation_loss,
 )
 from bootifol.errors import BootifolError
 from bootifol.files import read_arrays, write_arrays
@@ -96,6 +97,20 @@ def test_losses_by_hand() -> None:
     target = torch.tensor([2.0, 2.0])
     assert critic_loss(q1, q2, target).item() == (1 + 0) / 2 + (1 + 9) / 2
     assert actor_loss(q1, q2).item() == -(1 + -1) / 2
+
+
+def test_saturation_loss_by_hand() -> None:
+    assert saturation_loss(torch.tensor([[1.0, -2.0], [0.0, 3.0]])).item() == (1 + 4 + 0 + 9) / 4
+
+
+@pytest.mark.parametrize(("weight", "comes_back"), [(0.0, False), (0.01, True)])
+def test_a_saturated_actor_comes_back_with_the_saturation_loss_alone(weight: float, comes_back: bool) -> None:
+    agent = make_agent(dataclasses.replace(SMALL, saturation_weight=weight, learning_rate=0.05))
+    with torch.no_grad():
+        agent.actor.policy.output.bias.fill_(12.0)
+    saturated = [agent.update(make_batch(i), 10**6)["agent/saturated"] for i in range(100)]
+    assert saturated[0] == 1.0
+    assert (saturated[-1] < 0.9) == comes_back
 
 
 def test_updates_are_those_of_the_plain_version() -> None:

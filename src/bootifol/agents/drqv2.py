@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from bootifol.agents.networks import Actor, Critic, Encoder, EncoderName, initialize
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, require_at_least
 from bootifol.types import Action, Arrays, Batch, Metrics, Observation
 
 Precision = Literal["bf16", "fp32"]
@@ -116,9 +116,7 @@ class DrQv2Config:
             "shift",
         )
         for names, least in ((at_least_one, 1), (not_negative, 0)):
-            for name in names:
-                if not getattr(self, name) >= least:
-                    raise BootifolError(f"agent {name} must be at least {least}, not {getattr(self, name)}")
+            require_at_least(least, **{f"agent {name}": getattr(self, name) for name in names})
         for name in ("discount", "target_rate"):
             if not 0 <= getattr(self, name) <= 1:
                 raise BootifolError(f"agent {name} must lie in [0, 1], not {getattr(self, name)}")

@@ -85,19 +85,13 @@ class FrameEncoder(nn.Module):
         video_size: side of the pictures in pixels.
         width_divisor: divides the channels of the hidden layers.
         leak: slope of LeakyReLU below zero.
-        normalize: beyond the paper: brings each of the 128 numbers to mean 0 and variance 1 (BatchNorm without
-            parameters).
     """
 
-    def __init__(
-        self, video_size: int, width_divisor: int = 1, leak: float = 0.2, normalize: bool = False
-    ) -> None:
+    def __init__(self, video_size: int, width_divisor: int = 1, leak: float = 0.2) -> None:
         super().__init__()
         self.lightness = ViewEncoder(1, video_size, width_divisor, leak)
         self.color = ViewEncoder(2, video_size, width_divisor, leak)
-        self.normalization = nn.BatchNorm1d(STATE_SIZE, affine=False) if normalize else nn.Identity()
 
     def forward(self, lightness: torch.Tensor, color: torch.Tensor) -> torch.Tensor:
         """Views L `[N, 1, H, W]` and ab `[N, 2, H, W]` to states `[N, 128]`: 64 numbers of L, then 64 of ab."""
-        states = torch.cat([self.lightness(lightness), self.color(color)], dim=1)
-        return cast(torch.Tensor, self.normalization(states))
+        return torch.cat([self.lightness(lightness), self.color(color)], dim=1)

@@ -6,15 +6,9 @@ from dataclasses import dataclass, field
 
 from bootifol.agents.drqv2 import DrQv2Config
 from bootifol.envs.pictures import PictureConfig
-from bootifol.errors import BootifolError
+from bootifol.errors import require_at_least
 from bootifol.rewards.registry import RewardConfig
 from bootifol.training.demonstrations import DemonstrationConfig
-
-
-def _at_least(minimum: float, **fields: float) -> None:
-    for name, value in fields.items():
-        if value < minimum:
-            raise BootifolError(f"{name} must be at least {minimum}, not {value}")
 
 
 @dataclass(frozen=True)
@@ -31,8 +25,8 @@ class AlignmentConfig:
     """Gradient steps a line of metrics averages over."""
 
     def __post_init__(self) -> None:
-        _at_least(0, gradient_steps=self.gradient_steps, time_share=self.time_share)
-        _at_least(1, log_every=self.log_every)
+        require_at_least(0, gradient_steps=self.gradient_steps, time_share=self.time_share)
+        require_at_least(1, log_every=self.log_every)
 
 
 @dataclass(frozen=True)
@@ -59,13 +53,13 @@ class InteractiveConfig:
     """Agent steps a line of metrics averages over."""
 
     def __post_init__(self) -> None:
-        _at_least(
+        require_at_least(
             0,
             agent_steps=self.agent_steps,
             reward_updates_until=self.reward_updates_until,
             relabel_episodes=self.relabel_episodes,
         )
-        _at_least(
+        require_at_least(
             1,
             reward_update_every=self.reward_update_every,
             agent_videos=self.agent_videos,
@@ -96,9 +90,9 @@ class EvaluationConfig:
     """Starts from which expert, agent and random play for the report's videos and film strips."""
 
     def __post_init__(self) -> None:
-        _at_least(1, every=self.every, final_episodes=self.final_episodes)
-        _at_least(0, episodes=self.episodes, long_episodes=self.long_episodes)
-        _at_least(0, held_out_videos=self.held_out_videos, showcase_episodes=self.showcase_episodes)
+        require_at_least(1, every=self.every, final_episodes=self.final_episodes)
+        require_at_least(0, episodes=self.episodes, long_episodes=self.long_episodes)
+        require_at_least(0, held_out_videos=self.held_out_videos, showcase_episodes=self.showcase_episodes)
 
 
 @dataclass(frozen=True)
@@ -123,4 +117,4 @@ class TrainingConfig:
     """Also write TensorBoard event files."""
 
     def __post_init__(self) -> None:
-        _at_least(1, threads=self.threads)
+        require_at_least(1, threads=self.threads)

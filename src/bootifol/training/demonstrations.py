@@ -14,7 +14,7 @@ import torch
 
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.envs.pictures import resize
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, require_at_least
 from bootifol.evaluation.ranking import draw_references
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
@@ -47,9 +47,8 @@ class DemonstrationConfig:
     def __post_init__(self) -> None:
         if not 0 <= self.share < 1:
             raise BootifolError(f"demonstrations: share must be in [0, 1), not {self.share}")
-        for name in ("videos", "first_updates", "updates", "refresh_every", "batch_size"):
-            if getattr(self, name) < 1:
-                raise BootifolError(f"demonstrations: {name} must be at least 1, not {getattr(self, name)}")
+        names = ("videos", "first_updates", "updates", "refresh_every", "batch_size")
+        require_at_least(1, **{f"demonstrations.{name}": getattr(self, name) for name in names})
 
 
 class Demonstrations:

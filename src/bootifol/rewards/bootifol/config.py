@@ -75,10 +75,6 @@ class BootifolConfig:
     width_divisor: int = 1
     """Divides the channels of the frame encoders and the decoder; 1 is the paper's network."""
 
-    normalize_states: bool = False
-    """Beyond the paper: frame states s have mean 0 and variance 1 in every dimension. Off in every preset: beside
-    `motion` it measured worse (docs/results.md)."""
-
     motion: bool = False
     """Beyond the paper: f also reads how the state changed since the frame before; false is the paper's network."""
 

@@ -110,7 +110,7 @@ class BootifolRewardModel:
         load_module_state(self.networks, self._optimizer, arrays)
         load_generator(self._rng, arrays["random"])
         self.version = int(arrays["version"][0])
-        self._scale.means = arrays["reward_scale"].copy()
+        self._scale.means = arrays["reward_scale"].astype(np.float64)
         self._encodings.clear()
 
     def _step(self, expert: VideoSource, other: VideoSource, scaling: bool) -> Metrics:
@@ -141,7 +141,9 @@ class BootifolRewardModel:
             self._scale.observe(drawn.kept, distances)
         return metrics
 
-    def _losses(self, videos: FrameBatch, drawn: Draw) -> tuple[torch.Tensor, dict[str, float], NDArray[np.float64]]:
+    def _losses(
+        self, videos: FrameBatch, drawn: Draw
+    ) -> tuple[torch.Tensor, dict[str, float], NDArray[np.float64]]:
         """L and its terms on n expert videos followed by n others, uint8 `[2n, T' + 1, H, W, 3]`.
 
         Returns:
@@ -198,7 +200,11 @@ class BootifolRewardModel:
         metrics = {f"loss/{name}": float(term.detach()) for name, term in terms.items()}
         return (
             total,
-            {**metrics, "loss/total": float(total.detach()), "distance/expert_other": float(distances.mean())},
+            {
+                **metrics,
+                "loss/total": float(total.detach()),
+                "distance/expert_other": float(distances.mean()),
+            },
             distances,
         )
 

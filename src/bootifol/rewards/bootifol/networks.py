@@ -16,9 +16,7 @@ class BootifolNetworks(nn.Module):
 
     def __init__(self, config: BootifolConfig, video_size: int) -> None:
         super().__init__()
-        self.frame_encoder = FrameEncoder(
-            video_size, config.width_divisor, config.leak, config.normalize_states
-        )
+        self.frame_encoder = FrameEncoder(video_size, config.width_divisor, config.leak)
         self.frame_decoder = FrameDecoder(video_size, config.width_divisor, config.leak)
         self.sequence_encoder = SequenceEncoder(config.motion)
         self.state_predictor = StatePredictor(config.leak)
