@@ -301,7 +301,7 @@ def test_same_seed_same_agent() -> None:
 
 
 def test_acting() -> None:
-    agent = make_agent(dataclasses.replace(SMALL, warm_up_steps=100))
+    agent = make_agent()
     observation = make_batch().observation[0].permute(1, 2, 0).contiguous().numpy()
     greedy = [agent.act(observation, 200, explore=False) for _ in range(2)]
     np.testing.assert_array_equal(*greedy)
@@ -311,12 +311,8 @@ def test_acting() -> None:
         expected = agent.actor(agent.encoder(picture))[0].numpy()
     np.testing.assert_allclose(greedy[0], expected, atol=1e-6)
 
-    warm_up = np.array([agent.act(observation, 99, explore=True) for _ in range(500)])
-    assert np.abs(warm_up).max() <= 1
-    np.testing.assert_allclose(
-        np.histogram(warm_up, bins=4, range=(-1, 1))[0] / warm_up.size, 0.25, atol=0.05
-    )
-
+    early = np.array([agent.act(observation, 0, explore=True) for _ in range(300)])
+    assert np.abs(early).max() == 1
     late = np.array([agent.act(observation, 500_000, explore=True) for _ in range(300)])
     np.testing.assert_allclose((late - expected).std(), 0.1, atol=0.02)
 

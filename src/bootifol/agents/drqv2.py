@@ -72,7 +72,7 @@ class DrQv2Config:
     """Largest noise on the actions that the losses evaluate; the actions taken are not so limited."""
 
     warm_up_steps: int = 1920
-    """Agent steps of uniformly random actions before the first update."""
+    """Agent steps of uniformly random actions before the first update; the Interactive Phase draws them."""
 
     replay_capacity: int = 100_000
     """Frames that replay holds; an episode of T transitions takes T + 1."""
@@ -239,16 +239,12 @@ class DrQv2:
         Args:
             observation: uint8 `[S, S, 3 * stack]`.
             agent_steps: where the noise schedule stands.
-            explore: True adds its noise (and draws uniformly during the warm-up); False returns the mean.
+            explore: True adds its noise; False returns the mean.
 
         Returns:
             float32 `[A]` in [-1, 1].
         """
         with torch.inference_mode():
-            if explore and agent_steps < self.config.warm_up_steps:
-                shape = (self.actor.policy.output.out_features,)
-                uniform = torch.rand(shape, generator=self._generator, device=self._device)
-                return _to_numpy(uniform * 2 - 1)
             picture = torch.from_numpy(observation).to(self._device).permute(2, 0, 1).unsqueeze(0)
             mean = self.actor(self.encoder(picture.float()))
             if explore:
