@@ -17,7 +17,7 @@ from bootifol.training.config import (
     TrainingConfig,
 )
 
-PresetName = Literal["paper", "cpu", "demo", "smoke"]
+PresetName = Literal["paper", "cpu", "demo", "drawn", "smoke"]
 
 PAPER = TrainingConfig()
 """The paper's hyperparameters to the digit: they are the defaults of every field."""
@@ -69,6 +69,34 @@ DEMO = replace(
 )
 """For `make demo`: `cpu` in minutes, most of them for the reward, whose result can be seen so soon."""
 
+DRAWN = replace(
+    CPU,
+    pictures=PictureConfig(agent_size=32, video_size=32, stack=2),
+    reward=RewardConfig(replace(CPU.reward.bootifol, width_divisor=8)),
+    agent=replace(
+        CPU.agent,
+        hidden_dim=128,
+        batch_size=64,
+        warm_up_steps=600,
+        exploration_steps=2250,
+        replay_capacity=10_000,
+        learning_rate=5e-4,
+        discount=0.9,
+        target_rate=0.02,
+        shift=2,
+        saturation_weight=0.1,
+    ),
+    alignment=AlignmentConfig(gradient_steps=150, time_share=0.25, log_every=10),
+    interactive=InteractiveConfig(
+        agent_steps=4500, reward_updates_until=2250, agent_videos=150, log_every=250
+    ),
+    evaluation=EvaluationConfig(
+        every=750, episodes=5, long_episodes=5, final_episodes=50, held_out_videos=16
+    ),
+)
+"""For the tasks drawn with numpy, at 32 pixels: a policy from videos in two minutes, and no simulator. The learning
+test runs it."""
+
 SMOKE = replace(
     CPU,
     reward=RewardConfig(replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4)),
@@ -88,7 +116,13 @@ SMOKE = replace(
 )
 """Every stage in under two minutes. It learns nothing worth having."""
 
-PRESETS: dict[PresetName, TrainingConfig] = {"paper": PAPER, "cpu": CPU, "demo": DEMO, "smoke": SMOKE}
+PRESETS: dict[PresetName, TrainingConfig] = {
+    "paper": PAPER,
+    "cpu": CPU,
+    "demo": DEMO,
+    "drawn": DRAWN,
+    "smoke": SMOKE,
+}
 
 
 def preset(name: str) -> TrainingConfig:

@@ -16,36 +16,20 @@ from rich.console import Console
 
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.record import record_demos
-from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.rollout import Act
 from bootifol.evaluation.ranking import area_under_curve, rank_videos
 from bootifol.evaluation.returns import evaluate
 from bootifol.experts import make_random
-from bootifol.presets import CPU
+from bootifol.presets import DRAWN
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.tasks import make_environment, task_named
-from bootifol.training.config import AlignmentConfig, InteractiveConfig
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 from bootifol.types import Rewards, Video
 
 TASK = "drawn_home"
-PICTURES = PictureConfig(agent_size=32, video_size=32, stack=2)
-REWARD = replace(CPU.reward.bootifol, width_divisor=8)
-AGENT_STEPS = 4500
-AGENT = replace(
-    CPU.agent,
-    encoder="strided",
-    hidden_dim=128,
-    batch_size=64,
-    warm_up_steps=600,
-    exploration_steps=AGENT_STEPS // 2,
-    replay_capacity=AGENT_STEPS + 1000,
-    learning_rate=5e-4,
-    discount=0.9,
-    target_rate=0.02,
-    shift=2,
-)
+CONFIG = replace(DRAWN, threads=1, tensorboard=False, evaluation=replace(DRAWN.evaluation, every=10**9))
+PICTURES = CONFIG.pictures
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +48,7 @@ def test_the_learned_reward_prefers_what_the_videos_show(tmp_path: Path, shown: 
     for kind in (shown, other):
         sources[kind], aside = DemoSet.open(tmp_path / kind).split(24)
         unseen[kind] = [aside[index] for index in range(len(aside))]
-    model = BootifolRewardModel(REWARD, PICTURES.video_size, seed=1)
+    model = BootifolRewardModel(CONFIG.reward.bootifol, PICTURES.video_size, seed=1)
     steps = model.align(sources[shown], sources[other])
     for _ in range(120):
         next(steps)
@@ -73,21 +57,6 @@ def test_the_learned_reward_prefers_what_the_videos_show(tmp_path: Path, shown: 
     preferred = area_under_curve(rewards[shown], rewards[other])
     print(f"AUC {shown} above {other}: {preferred:.2f}")
     assert preferred > 0.8
-
-
-CONFIG = replace(
-    CPU,
-    pictures=PICTURES,
-    threads=1,
-    tensorboard=False,
-    reward=replace(CPU.reward, bootifol=REWARD),
-    agent=AGENT,
-    alignment=AlignmentConfig(gradient_steps=150),
-    interactive=InteractiveConfig(
-        agent_steps=AGENT_STEPS, reward_updates_until=AGENT_STEPS // 2, agent_videos=150
-    ),
-    evaluation=replace(CPU.evaluation, every=10**9),
-)
 
 
 class ShuffledReward(BootifolRewardModel):
@@ -105,7 +74,7 @@ class ShuffledReward(BootifolRewardModel):
 
 
 def new_run(demos: Path, directory: Path) -> Run:
-    run = RunConfig(TASK, "bootifol", "cpu", 1, str(demos), None, CONFIG)
+    run = RunConfig(TASK, "bootifol", "drawn", 1, str(demos), None, CONFIG)
     return Run(run, directory, Console(quiet=True))
 
 
@@ -117,7 +86,7 @@ def return_of(act: Act) -> float:
 
 def return_of_agent(run: Run) -> float:
     agent = run.components.agent
-    return return_of(lambda observation: agent.act(observation, AGENT_STEPS, explore=False))
+    return return_of(lambda observation: agent.act(observation, 0, explore=False))
 
 
 def test_a_policy_is_learned_from_videos_alone(tmp_path: Path, demos: Path) -> None:
@@ -137,5 +106,4 @@ def test_a_policy_is_learned_from_videos_alone(tmp_path: Path, demos: Path) -> N
         f"return {learned:.1f}; frozen {frozen:.1f}, random {random:.1f}, shuffled reward {shuffled:.1f}, "
         f"expert {expert}"
     )
-    assert learned > 0.75 * expert
-    assert max(frozen, random, shuffled) < 0.4 * expert
+    assert learned > 0.6 * expert > 2 * max(frozen, random, shuffled)

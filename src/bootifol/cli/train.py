@@ -39,8 +39,9 @@ def train(
         config: Every setting of the preset, which the flags below change one by one.
         task: The environment to act in; `bootifol tasks` lists them.
         method: bootifol learns its reward from the videos; environment uses the true reward, as an upper bound.
-        preset: paper: its hyperparameters to the digit. cpu: 2 cores, within 3 hours. smoke: every stage in under
-            two minutes. demo: what `make demo` runs, with a time budget of minutes.
+        preset: paper: its hyperparameters to the digit. cpu: 2 cores, within 3 hours. demo: what `make demo` runs, with
+            a time budget of minutes. drawn: the tasks drawn with numpy, in two minutes. smoke: every stage, in under
+            two minutes.
         demos: Directory of the videos, from `bootifol demos record` or `bootifol demos import`.
         out: Directory to write the run to, such as runs/first.
         seed: Of everything random.

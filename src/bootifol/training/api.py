@@ -57,7 +57,7 @@ def train_policy(
         demos: directory of the videos.
         out: directory of the run, new or empty.
         method: bootifol, or environment for the upper bound.
-        preset: paper, cpu or smoke.
+        preset: paper, cpu, demo, drawn or smoke.
         seed: of everything random.
         time_budget: seconds of wall-clock time for learning; None for the configuration's agent steps.
         config: instead of the preset's.
