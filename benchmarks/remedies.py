@@ -51,6 +51,7 @@ VARIANTS: dict[str, Callable[[TrainingConfig], TrainingConfig]] = {
     "reward frozen after alignment": lambda config: replace(
         config, interactive=replace(config.interactive, reward_updates_until=0)
     ),
+    "spoiled_share 0.5": lambda config: _reward(config, spoiled_share=0.5),
     "relabel_episodes 4": lambda config: replace(
         config, interactive=replace(config.interactive, relabel_episodes=4)
     ),

@@ -176,6 +176,28 @@ def test_alignment_scale_gives_random_episodes_about_zero_a_step() -> None:
     np.testing.assert_array_equal(model.state()["reward_scale"], scale)
 
 
+def test_spoiled_share_of_the_others_is_drawn_from_the_expert() -> None:
+    drawn: list[int] = []
+
+    class Counted:
+        def __len__(self) -> int:
+            return len(EXPERT)
+
+        def __getitem__(self, index: int) -> Video:
+            return EXPERT[index]
+
+        def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
+            drawn.append(count)
+            return EXPERT.sample(count, rng)
+
+    n = SMALL.videos_per_class
+    for share in (0.0, 0.5):
+        next(make(replace(SMALL, spoiled_share=share)).align(Counted(), OTHER))
+    assert drawn == [n, n, n // 2]
+    with pytest.raises(BootifolError, match="spoiled_share"):
+        BootifolConfig(spoiled_share=1.0)
+
+
 def test_resumed_training_is_bit_for_bit_the_uninterrupted_one() -> None:
     config = replace(SMALL, precision="bf16", frames_per_video=5, reward_scale="alignment")
     straight = aligned(4, config)

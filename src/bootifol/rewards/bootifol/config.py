@@ -68,6 +68,10 @@ class BootifolConfig:
     videos_per_class: int = 16
     """n: a batch has n expert videos and n others."""
 
+    spoiled_share: float = 0.0
+    """Beyond the paper: share of the other videos that are expert videos spoiled in time (`spoiled.py`); 0, as in the
+    paper, none."""
+
     frames_per_video: int | None = None
     """Frames of each video on which L_S, L_triplet and L_ae are computed, drawn anew every step; none (the paper)
     means all. L_Z and L_O always read every frame."""
@@ -104,6 +108,8 @@ class BootifolConfig:
                 f"reward model: videos_per_class is {self.videos_per_class}, but L_O compares an expert video "
                 "with another one, so it must be at least 2"
             )
+        if not 0 <= self.spoiled_share < 1:
+            raise BootifolError(f"reward model: spoiled_share is {self.spoiled_share}, but must be in [0, 1)")
         if not 0 <= self.frame_drop < 1:
             raise BootifolError(f"reward model: frame_drop is {self.frame_drop}, but must be in [0, 1)")
         if self.frames_per_video is not None and self.frames_per_video < 1:

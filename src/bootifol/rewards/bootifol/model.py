@@ -15,6 +15,7 @@ from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.networks import BootifolNetworks
 from bootifol.rewards.bootifol.sampling import Draw, draw
 from bootifol.rewards.bootifol.scale import DistanceScale
+from bootifol.rewards.bootifol.spoiled import spoiled
 from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
 from bootifol.types import Arrays, FrameBatch, Frames, Metrics, Rewards, Video, VideoSource
 
@@ -118,8 +119,12 @@ class BootifolRewardModel:
         n = self.config.videos_per_class
         expert_videos = self._checked(expert.sample(n, self._rng))
         other_videos = self._checked(other.sample(n, self._rng))
+        spoiled_count = round(self.config.spoiled_share * n)
         length = min(expert_videos.shape[1], other_videos.shape[1])
         videos = np.concatenate([expert_videos[:, :length], other_videos[:, :length]])
+        if spoiled_count:
+            shown = self._checked(expert.sample(spoiled_count, self._rng))
+            videos[-spoiled_count:] = spoiled(shown[:, :length], self._rng)
         drawn = draw(self.config, 2 * n, length, self._rng)
         statistics = [buffer.clone() for buffer in self.networks.buffers()]
         self._optimizer.zero_grad(set_to_none=True)
@@ -138,7 +143,7 @@ class BootifolRewardModel:
         self.version += 1
         self._encodings.clear()
         if scaling:
-            self._scale.observe(drawn.kept, distances)
+            self._scale.observe(drawn.kept, distances[: n - spoiled_count].mean(0))
         return metrics
 
     def _losses(
@@ -147,7 +152,7 @@ class BootifolRewardModel:
         """L and its terms on n expert videos followed by n others, uint8 `[2n, T' + 1, H, W, 3]`.
 
         Returns:
-            L; the metrics; the mean distance of expert and other encodings at each kept frame, `[T' + 1]`.
+            L; the metrics; the distance of each expert's and other's encodings at every kept frame, `[n, T' + 1]`.
         """
         config = self.config
         count, length = videos.shape[:2]
@@ -196,7 +201,7 @@ class BootifolRewardModel:
         weights = {name: getattr(config, f"{name}_weight") for name in terms}
         total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
         with torch.no_grad():
-            distances = torch.linalg.vector_norm(expert - other, dim=2).mean(0).double().cpu().numpy()
+            distances = torch.linalg.vector_norm(expert - other, dim=2).double().cpu().numpy()
         metrics = {f"loss/{name}": float(term.detach()) for name, term in terms.items()}
         return (
             total,
