@@ -119,7 +119,7 @@ class BootifolRewardModel:
         n = self.config.videos_per_class
         expert_videos = self._checked(expert.sample(n, self._rng))
         other_videos = self._checked(other.sample(n, self._rng))
-        spoiled_count = round(self.config.spoiled_share * n)
+        spoiled_count = int(self.config.spoiled_share * n)
         length = min(expert_videos.shape[1], other_videos.shape[1])
         videos = np.concatenate([expert_videos[:, :length], other_videos[:, :length]])
         if spoiled_count:

@@ -31,8 +31,8 @@ def spoiled(videos: FrameBatch, rng: np.random.Generator) -> FrameBatch:
         The same shape; frames are those of the video itself, in another order.
     """
     count, frames = videos.shape[:2]
-    ways: NDArray[np.int64] = rng.integers(3, size=count)
-    turns: NDArray[np.int64] = 1 + rng.integers(max(int(LATEST_TURN * (frames - 1)), 1), size=count)
+    ways = rng.integers(3, size=(count,))
+    turns = 1 + rng.integers(max(int(LATEST_TURN * (frames - 1)), 1), size=(count,))
     order = np.stack([_order(int(ways[i]), int(turns[i]), frames) for i in range(count)])
     result: FrameBatch = videos[np.arange(count)[:, None], order]
     return result
