@@ -2,8 +2,10 @@
 
     python -m benchmarks.alignment_ranking --demos demos/reacher_hard --steps 200 --out results/alignment_ranking.csv
 
-Held-out expert, half-good and random videos are rewarded against eight expert videos as the preset `cpu` does. AUC is
-the chance that a better video is rewarded above a worse one (0.5: a coin).
+Held-out expert, half-good and random videos are rewarded against eight expert videos as the preset does. AUC is the
+chance that a better video is rewarded above a worse one (0.5: a coin). Beside it, how well the reward follows the true
+return of performances of every degree, none of them the expert's own (Spearman; see benchmarks.diagnosis): that is what
+an agent needs, and a reward that merely likes smooth motion does not have it.
 """
 
 from __future__ import annotations
@@ -16,29 +18,54 @@ from pathlib import Path
 import numpy as np
 import torch
 from rich.console import Console
+from scipy import stats
 
+from benchmarks.diagnosis import performers
 from bootifol.demos.demo_set import DemoSet
-from bootifol.evaluation.ranking import KINDS, rank_videos, ranking_scores
+from bootifol.envs.pictures import PictureConfig
+from bootifol.envs.rollout import play_episode
+from bootifol.evaluation.ranking import KINDS, draw_references, rank_videos, ranking_scores
 from bootifol.files import written_aside
 from bootifol.memory import keep_freed_memory
-from bootifol.presets import CPU
+from bootifol.presets import preset
 from bootifol.progress import progress
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
+from bootifol.tasks import make_environment, task_named
+from bootifol.types import Video
 
-VARIANTS: dict[str, BootifolConfig] = {
-    "preset cpu": CPU.reward.bootifol,
-    "without motion": replace(CPU.reward.bootifol, motion=False),
-    "without sequence_times": replace(CPU.reward.bootifol, sequence_times=1),
-    "without both: the paper's network": replace(CPU.reward.bootifol, motion=False, sequence_times=1),
-}
+
+def variants(config: BootifolConfig) -> dict[str, BootifolConfig]:
+    """The preset's reward model, and others by name."""
+    return {
+        "preset": config,
+        "spoiled_share 0.5": replace(config, spoiled_share=0.5),
+        "without motion": replace(config, motion=False),
+        "without sequence_times": replace(config, sequence_times=1),
+        "without both: the paper's network": replace(config, motion=False, sequence_times=1),
+    }
+
+
+def graded(task: str, pictures: PictureConfig, episodes: int) -> tuple[list[Video], list[float]]:
+    """Videos and true returns of all performers but the expert itself."""
+    environment = make_environment(task, pictures, task_named(task).episode_steps)
+    videos, returns = [], []
+    for name, make in performers(task, environment).items():
+        for seed in range(episodes if name != "expert" else 0):
+            played = play_episode(environment, make(seed), 10**6 + seed, f"{name}-{seed}")
+            videos.append(played.episode.video)
+            returns.append(played.environment_return)
+    return videos, returns
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("--task", default="reacher_hard")
+    parser.add_argument("--preset", default="cpu")
     parser.add_argument("--demos", type=Path, required=True)
+    parser.add_argument("--only", nargs="+", help="these variants alone")
     parser.add_argument("--steps", type=int, default=200, help="gradient steps of each variant")
     parser.add_argument("--every", type=int, default=50, help="gradient steps between two measurements")
     parser.add_argument("--held-out", type=int, default=32)
@@ -53,8 +80,12 @@ def main() -> None:
         sources[kind], aside = DemoSet.open(arguments.demos / kind).split(arguments.held_out)
         held_out[kind] = [aside[index] for index in range(len(aside))]
     rows: list[dict[str, object]] = []
-    with progress("aligning", total=len(VARIANTS) * arguments.steps) as advance:
-        for name, config in VARIANTS.items():
+    chosen = variants(preset(arguments.preset).reward.bootifol)
+    if arguments.only:
+        chosen = {name: chosen[name] for name in arguments.only}
+    videos, returns = graded(arguments.task, preset(arguments.preset).pictures, episodes=8)
+    with progress("aligning", total=len(chosen) * arguments.steps) as advance:
+        for name, config in chosen.items():
             model = BootifolRewardModel(config, held_out["expert"][0].frames.shape[1], arguments.seed)
             steps = model.align(sources["expert"], sources["random"])
             recent: list[float] = []
@@ -67,6 +98,11 @@ def main() -> None:
                     model, held_out, sources["expert"], np.random.default_rng(arguments.seed), agent_steps=0
                 )
                 scores = ranking_scores(ranked)
+                rng = np.random.default_rng(arguments.seed)
+                learned = [
+                    model.label(video, draw_references(model, sources["expert"], rng)).sum()
+                    for video in videos
+                ]
                 rows.append(
                     {
                         "variant": name,
@@ -75,6 +111,7 @@ def main() -> None:
                         "kendall_tau": round(scores.kendall_tau, 4),
                         "expert_above_half_good": round(scores.expert_above_half_good, 4),
                         "half_good_above_random": round(scores.half_good_above_random, 4),
+                        "graded_spearman": round(float(stats.spearmanr(learned, returns).statistic), 4),
                     }
                 )
                 Console().print(rows[-1])

@@ -106,7 +106,8 @@ def trained(variant: str, seed: int, task: str, demos: Path, time_budget: str) -
             Path(directory),
             Console(quiet=True),
         )
-        run.learn()
+        if not run.learn():
+            raise SystemExit("interrupted; the same command goes on with this run")
         agent, counters = run.components.agent, run.counters
     act: Act = lambda observation: agent.act(observation, 0, explore=False)  # noqa: E731
     described = task_named(task)
