@@ -41,17 +41,17 @@ CPU = TrainingConfig(
         encoder="strided",
         hidden_dim=512,
         batch_size=128,
-        exploration_steps=60_000,
+        exploration_steps=30_000,
         saturation_weight=0.01,
         replay_capacity=100_000,
     ),
     alignment=AlignmentConfig(gradient_steps=1500),
     interactive=InteractiveConfig(
-        agent_steps=300_000,
-        reward_updates_until=150_000,
+        agent_steps=150_000,
+        reward_updates_until=75_000,
         agent_videos=1500,
     ),
-    evaluation=EvaluationConfig(every=20_000, final_episodes=50),
+    evaluation=EvaluationConfig(every=10_000, final_episodes=50),
 )
 """The same algorithm with smaller networks, pictures and counts: meant for 3 hours on 2 cores and 8 GB.
 
