@@ -180,7 +180,7 @@ def draw(
     shades = colormaps["viridis"](np.linspace(0.0, 0.92, len(names) - 1))
     colors = {**dict(zip(names, shades, strict=False)), "agent": "#D55E00"}
     with house_style():
-        figure = Figure(figsize=(13.0, 4.2), layout="constrained")
+        figure = Figure(figsize=(14.4, 4.2), layout="constrained")
         across, along, fresh = figure.subplots(1, 3, width_ratios=(1.2, 1.2, 0.9))
         for name in names:
             of_name = [p for p in performances if p.performer == name]
@@ -195,7 +195,7 @@ def draw(
             along.plot(np.mean([p.rewards for p in of_name], axis=0), color=colors[name])
         across.set(xlabel="true return of the episode", ylabel="learned reward, summed")
         across.set_title(f"ranks? Spearman {rank:.2f} (expert, agent left out)", loc="left")
-        across.legend(fontsize=7, frameon=False)
+        figure.legend(loc="outside right center", fontsize=8)
         along.set(xlabel="agent step", ylabel="learned reward, mean")
         along.set_title("when does it tell them apart?", loc="left")
         if len(pairs):
