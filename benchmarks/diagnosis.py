@@ -105,27 +105,20 @@ def judged(run: Run, episodes: int) -> Iterator[Performance]:
 
 
 def staleness(run: Run, episodes: int) -> NDArray[np.float64]:
-    """Mean rewards a step `[n, 2]` of the newest stored episodes: as replay holds them, and as given now."""
+    """Mean rewards a step `[n, 2]` of stored episodes of every age: as replay holds them, and as given now."""
     replay, videos, model = run.components.replay, run.components.agent_videos, run.components.reward_model
     rng = np.random.default_rng(0)
     stored = replay.state()
-    newest = videos.newest(min(episodes, len(videos), len(replay.episode_ids)))
+    both = min(len(videos), len(replay.episode_ids))
+    newest = videos.newest(both)
+    starts, lengths = stored["episode_starts"][-both:], stored["episode_lengths"][-both:]
     pairs = []
-    for video, start, steps in zip(
-        newest,
-        stored["episode_starts"][-len(newest) :],
-        stored["episode_lengths"][-len(newest) :],
-        strict=True,
-    ):
-        held = stored["rewards"][(start + np.arange(steps)) % replay.capacity].mean()
-        pairs.append(
-            (held, model.label(_whole(video, steps), draw_references(model, run.demos.expert, rng)).mean())
-        )
+    for index in np.unique(np.linspace(0, both - 1, min(episodes, both)).astype(int)):
+        steps = int(lengths[index])
+        held = stored["rewards"][(starts[index] + np.arange(steps)) % replay.capacity].mean()
+        video = Video(f"{newest[index].name}-now", newest[index].frames[: steps + 1])
+        pairs.append((held, model.label(video, draw_references(model, run.demos.expert, rng)).mean()))
     return np.array(pairs, np.float64)
-
-
-def _whole(video: Video, steps: int) -> Video:
-    return Video(f"{video.name}-now", video.frames[: steps + 1])
 
 
 def main() -> None:
