@@ -56,7 +56,8 @@ CPU = TrainingConfig(
 """The same algorithm with smaller networks, pictures and counts: meant for 3 hours on 2 cores and 8 GB.
 
 Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
-`motion`, `sequence_times` and `references` of the reward model, each described at its field.
+`motion`, `sequence_times`, `references` and `reward_scale` of the reward model and `saturation_weight` of the agent,
+each described at its field.
 """
 
 DEMO = replace(

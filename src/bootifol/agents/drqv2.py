@@ -145,7 +145,7 @@ def actor_loss(q1: Tensor, q2: Tensor) -> Tensor:
 
 
 def saturation_loss(before_tanh: Tensor) -> Tensor:
-    """Mean square of the actor's outputs `[B, A]` before tanh (as in MR.Q: Fujimoto et al., 2025, equation 19)."""
+    """Mean square of the actor's outputs `[B, A]` before tanh (as MR.Q has it: Fujimoto et al., 2025)."""
     return before_tanh.square().mean()
 
 
