@@ -50,7 +50,7 @@ class Tracker:
         """Logs metrics of one moment.
 
         Args:
-            phase: "alignment" or "interactive".
+            phase: "alignment", "cloning" or "interactive".
             count_name: the unit that `count` counts: "gradient_step" or "agent_steps".
             count: how far the phase is.
             seconds: wall-clock time of the run so far, over all its sessions.

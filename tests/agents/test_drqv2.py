@@ -236,6 +236,38 @@ def test_the_critic_trains_the_encoder() -> None:
     )
 
 
+def test_cloning_trains_encoder_and_actor_and_nothing_else() -> None:
+    agent = make_agent()
+    before = agent.state()
+    batch = make_batch()
+    losses = [agent.clone(batch)["agent/cloning_loss"] for _ in range(40)]
+    assert losses[-1] < 0.5 * losses[0]
+    after = agent.state()
+    for name in before.keys() - {"generator"}:
+        assert np.array_equal(before[name], after[name]) == name.startswith(("critic.", "target_critic."))
+
+
+def test_demonstrated_rows_pull_actor_and_encoder_and_other_rows_do_not() -> None:
+    """With rewards that leave the critic as it is, only the cloning loss is left to train the encoder."""
+    agent = make_agent(dataclasses.replace(SMALL, cloning_weight=1.0))
+    agent.critic.q2.load_state_dict(agent.critic.q1.state_dict())
+    batch = make_batch()
+    with torch.no_grad():
+        reward, _ = agent.critic(agent.encoder(batch.observation.float()), batch.action)
+    batch = dataclasses.replace(batch, reward=reward, discount=torch.zeros(BATCH))
+    first = torch.arange(BATCH) < 2
+
+    def encoder_after(batch: Batch) -> np.ndarray:
+        tried = make_agent(agent.config)
+        tried.load_state(agent.state())
+        tried.update(batch, 0)
+        return tried.state()["encoder.first.weight"]
+
+    none, some = (dataclasses.replace(batch, demonstrated=rows) for rows in (None, first))
+    np.testing.assert_array_equal(encoder_after(none), agent.state()["encoder.first.weight"])
+    assert not np.array_equal(encoder_after(some), encoder_after(none))
+
+
 def test_target_critic_follows_slowly() -> None:
     agent = make_agent(dataclasses.replace(SMALL, target_rate=0.25))
     agent.update(make_batch(0), 0)
@@ -252,12 +284,14 @@ def test_state_is_exact(tmp_path, precision) -> None:
     config = dataclasses.replace(SMALL, precision=precision)
     agent = make_agent(config)
     for i in range(2):
+        agent.clone(make_batch(i))
         agent.update(make_batch(i), i)
     write_arrays(tmp_path / "agent.safetensors", agent.state())
     resumed = make_agent(config, seed=7)
     resumed.update(make_batch(5), 5)
     resumed.load_state(read_arrays(tmp_path / "agent.safetensors", "the agent"))
     observation = make_batch(9).observation[0].permute(1, 2, 0).contiguous().numpy()
+    assert agent.clone(make_batch(2)) == resumed.clone(make_batch(2))
     for i in range(2, 4):
         assert agent.update(make_batch(i), i) == resumed.update(make_batch(i), i)
         actions = [one.act(observation, 10, explore=True) for one in (agent, resumed)]

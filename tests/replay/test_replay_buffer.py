@@ -168,6 +168,33 @@ def test_relabel_changes_one_episode_alone() -> None:
     assert torch.equal(after.reward, torch.where(relabelled, before.action[:, 1], before.reward))
 
 
+def test_relabel_may_replace_the_actions_too() -> None:
+    buffer = filled(ReplayBuffer(60, SIZE, 2, n_step=1, shift=0), [5, 5])
+    actions = np.full((5, 2), 9, np.float32)
+    buffer.relabel(1, np.zeros(5, np.float32), actions)
+    batch = buffer.sample(10, np.random.default_rng(0), transitions=np.arange(10))
+    assert (batch.action[:5, 0] == 0).all() and (batch.action[5:] == 9).all()
+
+
+def test_named_transitions_are_taken_in_their_order() -> None:
+    buffer = filled(ReplayBuffer(60, SIZE, 2), [3, 4])
+    batch = buffer.sample(4, np.random.default_rng(0), transitions=np.array([6, 0, 2, 3]))
+    assert batch.action.tolist() == [[1, 3], [0, 0], [0, 2], [1, 0]]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_history_dropout_repeats_the_newest_frame(share: float) -> None:
+    buffer = filled(ReplayBuffer(60, SIZE, 2, stack=3, n_step=1, shift=0), [50])
+    transitions = np.arange(400) % 40 + 5
+    batch = buffer.sample(400, np.random.default_rng(0), transitions=transitions, history_dropout=share)
+    for observation, newest in ((batch.observation, transitions), (batch.next_observation, transitions + 1)):
+        times = observation[:, 1::3, 0, 0].numpy().astype(np.int64)
+        repeated = (times == newest[:, None]).all(axis=1)
+        whole = (times == newest[:, None] + [-2, -1, 0]).all(axis=1)
+        assert (repeated ^ whole).all()
+        assert abs(repeated.mean() - share) < 0.1
+
+
 def test_relabel_of_an_overwritten_episode_says_so() -> None:
     buffer = filled(ReplayBuffer(16, SIZE, 2), [5, 4, 6])
     before = {name: array.copy() for name, array in buffer.state().items()}

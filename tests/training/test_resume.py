@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from tiny_runs import TINY, new_run, resumed
 
+from bootifol.agents.drqv2 import DrQv2
 from bootifol.errors import BootifolError
 from bootifol.files import read_arrays, read_json
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.config import TrainingConfig
-from bootifol.training.demonstrations import DemonstrationConfig
+from bootifol.training.demonstrations import DemonstrationConfig, Demonstrations
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.train import Run
 
@@ -23,7 +24,7 @@ WITH_DEMONSTRATIONS = replace(
     TINY,
     agent=replace(TINY.agent, cloning_weight=1.0),
     demonstrations=DemonstrationConfig(
-        share=0.5, videos=4, first_updates=3, updates=1, refresh_every=60, batch_size=8
+        share=0.5, videos=4, first_updates=3, cloning_updates=4, updates=1, refresh_every=60, batch_size=8
     ),
 )
 
@@ -38,6 +39,40 @@ def signal_at(monkeypatch: pytest.MonkeyPatch, number: signal.Signals, episode: 
         play(self)
 
     monkeypatch.setattr(InteractivePhase, "play_episode", play_and_signal)
+
+
+def interrupt_at_call(monkeypatch: pytest.MonkeyPatch, owner: type, name: str, call: int) -> None:
+    """Sends this process Ctrl-C when a method is called for the `call`th time."""
+    method, calls = getattr(owner, name), []
+
+    def interrupting(*arguments: object) -> object:
+        calls.append(arguments)
+        if len(calls) == call:
+            os.kill(os.getpid(), signal.SIGINT)
+        return method(*arguments)
+
+    monkeypatch.setattr(owner, name, interrupting)
+
+
+def test_a_run_stopped_while_cloning_goes_on_where_it_was(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = new_run(tmp_path / "whole", demos, config=WITH_DEMONSTRATIONS)
+    assert whole.learn()
+
+    with monkeypatch.context() as patch:
+        interrupt_at_call(patch, Demonstrations, "learn_inverse_dynamics", call=2)
+        first = new_run(tmp_path / "parts", demos, config=WITH_DEMONSTRATIONS)
+        assert not first.learn()
+    assert (first.counters.inverse_dynamics_updates, first.counters.cloning_updates) == (2, 0)
+    with monkeypatch.context() as patch:
+        interrupt_at_call(patch, DrQv2, "clone", call=3)
+        second = resumed(tmp_path / "parts")
+        assert not second.learn()
+    assert (second.counters.inverse_dynamics_updates, second.counters.cloning_updates) == (3, 3)
+    rest = resumed(tmp_path / "parts")
+    assert rest.learn()
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
 
 
 def assert_same_checkpoint(one: Path, other: Path) -> None:

@@ -8,6 +8,7 @@ not, and exploration noise on a linear schedule, which also smooths the targets.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -74,6 +75,10 @@ class DrQv2Config:
     warm_up_steps: int = 1920
     """Agent steps of uniformly random actions before the first update; the Interactive Phase draws them."""
 
+    warm_up_hold: int = 1
+    """Largest number of agent steps that a random action of the warm-up is repeated for, drawn anew each time. 1, as
+    in the paper, never. Held actions reach speeds that trembling does not, and inverse dynamics needs to see them."""
+
     replay_capacity: int = 100_000
     """Frames that replay holds; an episode of T transitions takes T + 1."""
 
@@ -85,8 +90,11 @@ class DrQv2Config:
     saturated no gradient passes, and an actor that early estimates sent into a corner never comes back."""
 
     cloning_weight: float = 0.0
-    """Beyond the paper: how strongly the actor is pulled to the inferred actions of expert videos, relative to the
-    size of Q; 0, as in the paper, not at all. Needs `demonstrations`."""
+    """Beyond the paper: how strongly actor and encoder are pulled to the inferred actions of expert videos, relative
+    to the size of Q; 0, as in the paper, not at all. Needs `demonstrations`."""
+
+    cloning_learning_rate: float = 5e-4
+    """Of Adam for encoder and actor in the Cloning Phase, which only `demonstrations` has."""
 
     precision: Precision = "bf16"
     """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""
@@ -102,6 +110,7 @@ class DrQv2Config:
             "hidden_dim",
             "batch_size",
             "update_every",
+            "warm_up_hold",
             "n_step",
             "replay_capacity",
         )
@@ -120,8 +129,9 @@ class DrQv2Config:
         for name in ("discount", "target_rate"):
             if not 0 <= getattr(self, name) <= 1:
                 raise BootifolError(f"agent {name} must lie in [0, 1], not {getattr(self, name)}")
-        if not self.learning_rate > 0:
-            raise BootifolError(f"agent learning_rate must be positive, not {self.learning_rate}")
+        for name in ("learning_rate", "cloning_learning_rate"):
+            if not getattr(self, name) > 0:
+                raise BootifolError(f"agent {name} must be positive, not {getattr(self, name)}")
 
     def exploration(self, agent_steps: float) -> float:
         """Standard deviation of the noise after so many agent steps."""
@@ -149,17 +159,9 @@ def saturation_loss(before_tanh: Tensor) -> Tensor:
     return before_tanh.square().mean()
 
 
-def cloning_loss(action: Tensor, demonstrated_action: Tensor, q: Tensor) -> Tensor:
-    """Mean squared error to demonstrated actions, times the mean of |Q| so that its weight suits any reward's scale.
-
-    Not in DrQ-v2; the scale is that of TD3+BC (Fujimoto and Gu, 2021, equation 5), moved to the other term.
-
-    Args:
-        action: the actor's, `[B, A]`.
-        demonstrated_action: `[B, A]`.
-        q: the critic's estimates, `[B]`; no gradient passes.
-    """
-    return q.detach().abs().mean() * nn.functional.mse_loss(action, demonstrated_action)
+def cloning_loss(action: Tensor, demonstrated_action: Tensor) -> Tensor:
+    """Mean squared error of the actor's actions `[B, A]` to demonstrated ones `[B, A]`. Not in DrQ-v2."""
+    return nn.functional.mse_loss(action, demonstrated_action)
 
 
 def noisy_action(mean: Tensor, stddev: float, clip: float | None, generator: torch.Generator) -> Tensor:
@@ -232,6 +234,9 @@ class DrQv2:
             [*self.encoder.parameters(), *self.critic.parameters()], config.learning_rate, fused=True
         )
         self._actor_optimizer = torch.optim.Adam(self.actor.parameters(), config.learning_rate, fused=True)
+        self._cloning_optimizer = torch.optim.Adam(
+            [*self.encoder.parameters(), *self.actor.parameters()], config.cloning_learning_rate, fused=True
+        )
 
     def act(self, observation: Observation, agent_steps: float, explore: bool) -> Action:
         """One action.
@@ -250,6 +255,18 @@ class DrQv2:
             if explore:
                 mean = noisy_action(mean, self.config.exploration(agent_steps), None, self._generator)
             return _to_numpy(mean[0])
+
+    def clone(self, batch: Batch) -> Metrics:
+        """One gradient step of encoder and actor towards the actions of a batch; its rewards are not looked at.
+
+        Raises:
+            BootifolError: the loss is NaN or infinite; the parameters are as before.
+        """
+        with self._autocast():
+            action = self.actor(self.encoder(self._network_input(batch.observation)))
+        loss = cloning_loss(action, batch.action.to(self._device))
+        self._step(self._cloning_optimizer, loss, "cloning")
+        return {"agent/cloning_loss": float(loss.detach())}
 
     def update(self, batch: Batch, agent_steps: float) -> Metrics:
         """One update of critic and encoder, of the actor, and of the target critic, in this order.
@@ -272,7 +289,15 @@ class DrQv2:
             features = self.encoder(observation)
             q1, q2 = self.critic(features, action)
         loss_of_critic = critic_loss(q1, q2, target)
-        self._step(self._critic_optimizer, loss_of_critic, "critic")
+        rows = batch.demonstrated if self.config.cloning_weight > 0 else None
+        # Times the mean of |Q|, so that one weight suits rewards of any scale (as TD3+BC: Fujimoto and Gu, 2021).
+        cloning_weight = self.config.cloning_weight * q1.detach().abs().mean()
+        loss_of_encoder = loss_of_critic
+        if rows is not None:
+            with self._autocast():
+                cloned = self.actor(features[rows])
+            loss_of_encoder = loss_of_critic + cloning_weight * cloning_loss(cloned, action[rows])
+        self._step(self._critic_optimizer, loss_of_encoder, "critic")
 
         features = features.detach()
         with torch.no_grad(), self._autocast():
@@ -284,10 +309,9 @@ class DrQv2:
             loss_of_actor = actor_loss(*self.critic.value(trunk, self._noisy(mean_action, stddev)))
         if self.config.saturation_weight > 0:
             loss_of_actor = loss_of_actor + self.config.saturation_weight * saturation_loss(before_tanh)
-        if self.config.cloning_weight > 0 and batch.demonstrated is not None:
-            rows = batch.demonstrated
-            loss_of_cloning = cloning_loss(mean_action[rows], action[rows], q1)
-            loss_of_actor = loss_of_actor + self.config.cloning_weight * loss_of_cloning
+        if rows is not None:
+            loss_of_cloning = cloning_loss(mean_action[rows], action[rows])
+            loss_of_actor = loss_of_actor + cloning_weight * loss_of_cloning
             metrics["agent/cloning_loss"] = float(loss_of_cloning.detach())
         self._step(self._actor_optimizer, loss_of_actor, "actor")
 
@@ -306,11 +330,11 @@ class DrQv2:
         }
 
     def state(self) -> Arrays:
-        """Copies of all parameters, of both optimizers and of the noise generator."""
+        """Copies of all parameters, of the optimizers and of the noise generator."""
         arrays = {name: _copied(parameter) for name, parameter in self._parameters().items()}
-        for name, parameter in self._parameters().items():
-            for key, value in self._optimizer_state(parameter).items():
-                arrays[f"{key}/{name}"] = _copied(value)
+        for name, prefix, state in self._optimizer_states():
+            for key, value in state.items():
+                arrays[f"{prefix}{key}/{name}"] = _copied(value)
         arrays["generator"] = self._generator.get_state().numpy().copy()
         return arrays
 
@@ -328,11 +352,11 @@ class DrQv2:
                 )
             with torch.no_grad():
                 parameter.copy_(torch.from_numpy(arrays[name]))
-            state = self._optimizer_state(parameter)
+        for name, prefix, state in self._optimizer_states():
             state.clear()
             for key in ("step", "exp_avg", "exp_avg_sq"):
-                if f"{key}/{name}" in arrays:
-                    value = torch.from_numpy(arrays[f"{key}/{name}"].copy()).to(self._device)
+                if f"{prefix}{key}/{name}" in arrays:
+                    value = torch.from_numpy(arrays[f"{prefix}{key}/{name}"].copy()).to(self._device)
                     state[key] = value.to(memory_format=torch.channels_last) if value.dim() == 4 else value
         self._generator.set_state(torch.from_numpy(arrays["generator"].copy()))
 
@@ -349,12 +373,17 @@ class DrQv2:
             for name, parameter in network.named_parameters()
         }
 
-    def _optimizer_state(self, parameter: Tensor) -> dict[str, Tensor]:
-        for optimizer in (self._critic_optimizer, self._actor_optimizer):
-            if any(parameter is held for held in optimizer.param_groups[0]["params"]):
-                state: dict[str, Tensor] = optimizer.state[parameter]
-                return state
-        return {}
+    def _optimizer_states(self) -> Iterator[tuple[str, str, dict[str, Tensor]]]:
+        """Of each parameter that an optimizer holds: its name, a prefix for the optimizer, and what it keeps."""
+        optimizers = (
+            ("", self._critic_optimizer),
+            ("", self._actor_optimizer),
+            ("cloning_", self._cloning_optimizer),
+        )
+        for name, parameter in self._parameters().items():
+            for prefix, optimizer in optimizers:
+                if any(parameter is held for held in optimizer.param_groups[0]["params"]):
+                    yield name, prefix, optimizer.state[parameter]
 
     def _network_input(self, observation: Tensor) -> Tensor:
         dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32

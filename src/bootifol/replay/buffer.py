@@ -145,8 +145,8 @@ class ReplayBuffer:
         self._index()
         return self._next_id - 1
 
-    def relabel(self, episode_id: int, rewards: Rewards) -> bool:
-        """Replaces the rewards `[T]` of an episode.
+    def relabel(self, episode_id: int, rewards: Rewards, actions: NDArray[np.float32] | None = None) -> bool:
+        """Replaces the rewards `[T]` of an episode, and its actions `[T, A]` where there are new ones.
 
         Returns:
             False, with nothing changed, if the episode was already overwritten.
@@ -162,10 +162,20 @@ class ReplayBuffer:
             return False
         stored = self._episodes[episode_id - self.episode_ids.start]
         self._check_rewards(rewards, stored.agent_steps, episode_id)
-        self._rewards[(stored.start + np.arange(stored.agent_steps)) % self.capacity] = rewards
+        slots = (stored.start + np.arange(stored.agent_steps)) % self.capacity
+        self._rewards[slots] = rewards
+        if actions is not None:
+            self._actions[slots] = actions
         return True
 
-    def sample(self, batch_size: int, rng: np.random.Generator, same_shift: bool = False) -> Batch:
+    def sample(
+        self,
+        batch_size: int,
+        rng: np.random.Generator,
+        same_shift: bool = False,
+        transitions: NDArray[np.int64] | None = None,
+        history_dropout: float = 0.0,
+    ) -> Batch:
         """Draws transitions uniformly, with replacement.
 
         Args:
@@ -173,16 +183,19 @@ class ReplayBuffer:
             rng: draws transitions and shifts.
             same_shift: whether the two observations of a transition are shifted alike, for learning what moved
                 between them; otherwise each has its own random shift, as in DrQ-v2.
+            transitions: numbers `[B]` from 0 to `len(self) - 1`, the oldest first, to take these and draw none.
+            history_dropout: share of the transitions whose stacks repeat their newest frame, as at an episode's start.
 
         Raises:
             BootifolError: the buffer is empty.
         """
         if not self._episodes:
             raise BootifolError("replay is empty: add an episode before sampling from it")
-        drawn = rng.integers(len(self), size=batch_size)
+        drawn = rng.integers(len(self), size=batch_size) if transitions is None else transitions
         shifts = rng.integers(-self.shift, self.shift + 1, size=(2, batch_size, 2))
         if same_shift:
             shifts[1] = shifts[0]
+        has_history = rng.random(batch_size) >= history_dropout if history_dropout > 0 else None
 
         episode = np.searchsorted(self._transition_ends, drawn, side="right")
         start, steps = self._starts[episode], self._lengths[episode]
@@ -194,11 +207,11 @@ class ReplayBuffer:
         bootstraps = ~(self._terminated[episode] & (t + taken == steps))
 
         return Batch(
-            observation=self._observations(start, t, shifts[0]),
+            observation=self._observations(start, t, shifts[0], has_history),
             action=torch.from_numpy(self._actions[self._slot(start, t)]),
             reward=torch.from_numpy(reward.astype(np.float32)),
             discount=torch.from_numpy((self.discount**taken * bootstraps).astype(np.float32)),
-            next_observation=self._observations(start, t + taken, shifts[1]),
+            next_observation=self._observations(start, t + taken, shifts[1], has_history),
         )
 
     def state(self) -> Arrays:
@@ -263,10 +276,16 @@ class ReplayBuffer:
         return slot
 
     def _observations(
-        self, start: NDArray[np.int64], t: NDArray[np.int64], shifts: NDArray[np.int64]
+        self,
+        start: NDArray[np.int64],
+        t: NDArray[np.int64],
+        shifts: NDArray[np.int64],
+        has_history: NDArray[np.bool_] | None,
     ) -> torch.Tensor:
         """The shifted stacks ending at frame `t`, uint8 `[B, 3 * stack, S, S]`, channels-last in memory."""
         ages = np.arange(self.stack - 1, -1, -1)
+        if has_history is not None:
+            ages = ages * has_history[:, None]
         slots = self._slot(start[:, None], np.maximum(t[:, None] - ages, 0))
         size = self._frames.shape[1]
         out = torch.empty((len(t), size, size, _CHANNELS * self.stack), dtype=torch.uint8)

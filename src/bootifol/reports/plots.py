@@ -335,10 +335,10 @@ def _metric_figure(looks: Sequence[RunLook], panels: Sequence[tuple[str, str]], 
                 axes.set_ylabel(ylabel)
             if name.startswith("loss/") and axes.get_ylim()[0] > 0:
                 axes.set_ylim(bottom=0)
-            if phase == ALIGNMENT:
-                _step_axis(axes, "gradient steps")
-            else:
+            if phase == INTERACTIVE:
                 _agent_step_axis(axes)
+            else:
+                _step_axis(axes, "gradient steps")
         _legend(figure, looks)
         return figure
 

@@ -23,8 +23,9 @@ from bootifol.files import read_arrays, read_json
 from bootifol.types import Arrays, Frames
 
 ALIGNMENT = "alignment"
+CLONING = "cloning"
 INTERACTIVE = "interactive"
-COUNTERS = {ALIGNMENT: "gradient_step", INTERACTIVE: "agent_steps"}
+COUNTERS = {ALIGNMENT: "gradient_step", CLONING: "gradient_step", INTERACTIVE: "agent_steps"}
 """The phases, and what each counts."""
 
 
@@ -33,7 +34,7 @@ class Curve:
     """A metric over time; only finite values."""
 
     steps: NDArray[np.float64]
-    """`[N]` gradient steps (alignment) or agent steps (interactive)."""
+    """`[N]` gradient steps (alignment, cloning) or agent steps (interactive)."""
 
     values: NDArray[np.float64]
     """`[N]`."""

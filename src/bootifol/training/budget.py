@@ -19,6 +19,9 @@ class Counters:
     agent_updates: int = 0
     reward_updates: int = 0
     evaluations: int = 0
+    inverse_dynamics_updates: int = 0
+    """Of the Cloning Phase; later refreshes are not counted."""
+    cloning_updates: int = 0
     alignment_seconds: float = 0.0
     """Wall-clock time spent in the Alignment Phase."""
     interactive_seconds: float = 0.0

@@ -105,7 +105,7 @@ def build_demonstrations(run: RunConfig, expert: VideoSource, action_dim: int) -
     inverse_dynamics = InverseDynamics(
         agent.encoder, pictures.agent_size, pictures.stack, agent.n_step, action_dim, run.seed
     )
-    return Demonstrations(config, expert, replay, inverse_dynamics, pictures.agent_size)
+    return Demonstrations(config, expert, replay, inverse_dynamics, pictures.agent_size, action_dim)
 
 
 def build_components(
@@ -122,8 +122,12 @@ def build_components(
         f"memory when full: replay {replay_bytes / 1e9:.2f} GB ({config.agent.replay_capacity:,} frames), "
         f"the agent's videos {video_bytes / 1e9:.2f} GB ({config.interactive.agent_videos:,} episodes)"
     )
+    reward_model = build_reward_model(run)
+    demonstrations = None  # the upper bound has none: it learns from true rewards, which videos do not tell
+    if not reward_model.reads_environment_reward:
+        demonstrations = build_demonstrations(run, expert, action_dim)
     return Components(
-        reward_model=build_reward_model(run),
+        reward_model=reward_model,
         agent=build_agent(run, environment),
         replay=ReplayBuffer(
             config.agent.replay_capacity,
@@ -135,7 +139,7 @@ def build_components(
             config.agent.shift,
         ),
         agent_videos=AgentVideos(config.interactive.agent_videos, frames, pictures.video_size),
-        demonstrations=build_demonstrations(run, expert, action_dim),
+        demonstrations=demonstrations,
     )
 
 

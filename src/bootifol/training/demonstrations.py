@@ -1,8 +1,13 @@
 """Expert videos as experience: with inferred actions and learned rewards they enter the agent's batches.
 
 This goes beyond the paper, and is off by default. The agent's own steps teach an inverse-dynamics model which action
-leads from one picture to the next; it names the actions of the expert videos, the learned reward rewards them, and a
-share of every batch is drawn from them. Nobody gave an action or a reward: both are inferred from pictures.
+leads from one picture to the next; it names the actions of the expert videos, the learned reward rewards them, the
+policy starts as their clone (`cloning.py`), and a share of every batch is drawn from them. Nobody gave an action or a
+reward: both are inferred from pictures.
+
+A clone of stacked pictures learns to go on as it went: what it did last is visible in the stack, and most often what
+the expert did next. At rest it then stays at rest. So of most demonstrated stacks only the newest picture is kept, and
+most of them are drawn from where the picture moves ("copycat" policies: Wen et al., 2020).
 """
 
 from __future__ import annotations
@@ -11,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.envs.pictures import resize
@@ -18,7 +24,10 @@ from bootifol.errors import BootifolError, require_at_least
 from bootifol.evaluation.ranking import draw_references
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
-from bootifol.types import Arrays, Batch, Episode, Frames, Metrics, VideoSource
+from bootifol.types import Arrays, Batch, Episode, Frames, Metrics, Video, VideoSource
+
+MOVING = 0.1
+"""A picture moves where it changes by more than this share of its video's largest change."""
 
 
 @dataclass(frozen=True)
@@ -28,16 +37,25 @@ class DemonstrationConfig:
     share: float = 0.0
     """Share of each batch that is drawn from expert videos; 0, as in the paper, uses none."""
 
-    videos: int = 300
+    videos: int = 1000
     """Expert videos used so, at most; they take replay's memory a second time."""
 
-    first_updates: int = 2000
+    moving_share: float = 0.8
+    """Share of the transitions drawn from expert videos in which the picture moves."""
+
+    history_dropout: float = 0.8
+    """Share of the observations drawn from expert videos whose stack repeats its newest frame."""
+
+    first_updates: int = 1500
     """Gradient steps of the inverse dynamics when the agent's warm-up ends."""
+
+    cloning_updates: int = 4000
+    """Gradient steps of encoder and actor towards the inferred actions, after those of the inverse dynamics."""
 
     updates: int = 200
     """Gradient steps of the inverse dynamics at each later refresh."""
 
-    refresh_every: int = 2000
+    refresh_every: int = 10_000
     """Agent steps between two refreshes: the inverse dynamics learns from newer steps, and every demonstration gets
     its actions and rewards anew."""
 
@@ -45,10 +63,15 @@ class DemonstrationConfig:
     """Transitions of a gradient step of the inverse dynamics."""
 
     def __post_init__(self) -> None:
-        if not 0 <= self.share < 1:
-            raise BootifolError(f"demonstrations: share must be in [0, 1), not {self.share}")
+        for name, below in (("share", 1.0), ("moving_share", np.inf), ("history_dropout", np.inf)):
+            if not 0 <= getattr(self, name) < below or getattr(self, name) > 1:
+                border = ")" if below == 1 else "]"
+                raise BootifolError(
+                    f"demonstrations: {name} must be in [0, 1{border}, not {getattr(self, name)}"
+                )
         names = ("videos", "first_updates", "updates", "refresh_every", "batch_size")
         require_at_least(1, **{f"demonstrations.{name}": getattr(self, name) for name in names})
+        require_at_least(0, **{"demonstrations.cloning_updates": self.cloning_updates})
 
 
 class Demonstrations:
@@ -57,7 +80,7 @@ class Demonstrations:
     Args:
         config: see there; `share` must be above 0.
         expert: D_e.
-        replay: of the expert videos; empty, and large enough for them.
+        replay: empty, and large enough for the videos; filled here.
         inverse_dynamics: what infers the actions.
         frame_size: size of the agent's pictures.
     """
@@ -69,6 +92,7 @@ class Demonstrations:
         replay: ReplayBuffer,
         inverse_dynamics: InverseDynamics,
         frame_size: int,
+        action_dim: int,
     ) -> None:
         self.config = config
         self.expert = expert
@@ -78,6 +102,28 @@ class Demonstrations:
         self.count = min(config.videos, len(expert))
         self.refreshed_at = -1
         """Agent steps at the last refresh; -1 before the first."""
+        moving = []
+        for index in range(self.count):
+            frames = self._at_agent_size(expert[index])
+            steps = len(frames) - 1
+            nothing = np.zeros((steps, action_dim), np.float32)
+            replay.add(Episode(frames, nothing, expert[index], False), np.zeros(steps, np.float32))
+            moving.append(_moving(frames))
+        self._moving = np.flatnonzero(np.concatenate(moving))
+        self._still = np.flatnonzero(~np.concatenate(moving))
+
+    def learn_inverse_dynamics(self, agent_replay: ReplayBuffer, rng: np.random.Generator) -> Metrics:
+        """One gradient step of the inverse dynamics on the agent's own steps."""
+        return self.inverse_dynamics.update(agent_replay.sample(self.config.batch_size, rng, same_shift=True))
+
+    def refresh(self, agent_steps: int, reward_model: RewardModel, rng: np.random.Generator) -> None:
+        """Names actions and rewards of every video, as inverse dynamics and reward model now see them."""
+        for episode_id, index in zip(self.replay.episode_ids, range(self.count), strict=True):
+            video = self.expert[index]
+            rewards = reward_model.label(video, draw_references(reward_model, self.expert, rng))
+            actions = self.inverse_dynamics.actions(self._at_agent_size(video))
+            self.replay.relabel(episode_id, rewards, actions)
+        self.refreshed_at = agent_steps
 
     def refresh_if_due(
         self,
@@ -86,32 +132,35 @@ class Demonstrations:
         reward_model: RewardModel,
         rng: np.random.Generator,
     ) -> Metrics:
-        """Trains the inverse dynamics on the agent's steps, then names actions and rewards of the videos.
+        """Every `refresh_every` agent steps, trains the inverse dynamics further and refreshes the videos.
 
         Returns:
             Metrics of the last gradient step, or nothing where no refresh was due.
         """
-        first = self.refreshed_at < 0
-        if not first and agent_steps - self.refreshed_at < self.config.refresh_every:
+        if agent_steps - self.refreshed_at < self.config.refresh_every:
             return {}
         metrics: Metrics = {}
-        for _ in range(self.config.first_updates if first else self.config.updates):
-            batch = agent_replay.sample(self.config.batch_size, rng, same_shift=True)
-            metrics = self.inverse_dynamics.update(batch)
-        for index in range(self.count):
-            video = self.expert[index]
-            references = draw_references(reward_model, self.expert, rng)
-            rewards = reward_model.label(video, references)
-            frames = self._at_agent_size(video.frames)
-            self.replay.add(Episode(frames, self.inverse_dynamics.actions(frames), video, False), rewards)
-        self.refreshed_at = agent_steps
+        for _ in range(self.config.updates):
+            metrics = self.learn_inverse_dynamics(agent_replay, rng)
+        self.refresh(agent_steps, reward_model, rng)
         return metrics
+
+    def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
+        """Transitions of the expert videos, most of them where the picture moves."""
+        moving = round(batch_size * self.config.moving_share)
+        moving = batch_size if not len(self._still) else moving if len(self._moving) else 0
+        drawn = np.concatenate(
+            [rng.choice(self._moving, moving), rng.choice(self._still, batch_size - moving)]
+        )
+        return self.replay.sample(
+            batch_size, rng, transitions=drawn, history_dropout=self.config.history_dropout
+        )
 
     def mixed(self, agent_replay: ReplayBuffer, batch_size: int, rng: np.random.Generator) -> Batch:
         """A batch of which `share` comes from the expert videos."""
-        demonstrated = round(self.config.share * batch_size)
+        demonstrated = max(round(self.config.share * batch_size), 1)
         own = agent_replay.sample(batch_size - demonstrated, rng)
-        shown = self.replay.sample(demonstrated, rng)
+        shown = self.sample(demonstrated, rng)
         joined = {
             name: torch.cat([getattr(own, name), getattr(shown, name)])
             for name in ("observation", "action", "reward", "discount", "next_observation")
@@ -120,27 +169,35 @@ class Demonstrations:
         return replace(Batch(**joined), demonstrated=rows)
 
     def state(self) -> Arrays:
-        """The inverse dynamics, the demonstrations' replay and the time of the last refresh."""
-        parts = {"inverse_dynamics": self.inverse_dynamics.state(), "replay": self.replay.state()}
-        arrays = {
-            f"{part}/{name}": array for part, of_part in parts.items() for name, array in of_part.items()
+        """The inverse dynamics, the inferred actions and rewards, and the time of the last refresh."""
+        arrays = {f"inverse_dynamics/{name}": array for name, array in self.inverse_dynamics.state().items()}
+        stored = self.replay.state()
+        return {
+            **arrays,
+            "actions": stored["actions"],
+            "rewards": stored["rewards"],
+            "refreshed_at": np.array([self.refreshed_at], np.int64),
         }
-        return {**arrays, "refreshed_at": np.array([self.refreshed_at], np.int64)}
 
     def load_state(self, arrays: Arrays) -> None:
-        """Restores what `state` returned."""
-        for part, component in (("inverse_dynamics", self.inverse_dynamics), ("replay", self.replay)):
-            prefix = f"{part}/"
-            component.load_state(
-                {
-                    name.removeprefix(prefix): array
-                    for name, array in arrays.items()
-                    if name.startswith(prefix)
-                }
-            )
+        """Restores what `state` returned; the pictures are the demo set's."""
+        prefix = "inverse_dynamics/"
+        self.inverse_dynamics.load_state(
+            {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+        )
+        self.replay.load_state(
+            {**self.replay.state(), "actions": arrays["actions"], "rewards": arrays["rewards"]}
+        )
         self.refreshed_at = int(arrays["refreshed_at"][0])
 
-    def _at_agent_size(self, frames: Frames) -> Frames:
-        if frames.shape[1] == self.frame_size:
-            return frames
-        return np.stack([resize(frame, self.frame_size) for frame in frames])
+    def _at_agent_size(self, video: Video) -> Frames:
+        if video.frames.shape[1] == self.frame_size:
+            return video.frames
+        return np.stack([resize(frame, self.frame_size) for frame in video.frames])
+
+
+def _moving(frames: Frames) -> NDArray[np.bool_]:
+    """Whether the picture moves at each step of a video `[T + 1, S, S, 3]`, bool `[T]`."""
+    change = np.abs(np.diff(frames.astype(np.int16), axis=0)).mean(axis=(1, 2, 3))
+    moving: NDArray[np.bool_] = change > MOVING * change.max()
+    return moving

@@ -52,6 +52,8 @@ class InteractivePhase:
     def __post_init__(self) -> None:
         self.averages = Averages()
         self._watch = Stopwatch()
+        self._held_action: Action = np.zeros(self.environment.action_space.shape or (), np.float32)
+        self._held_steps = 0
 
     def start_clock(self) -> None:
         """Counts wall-clock time from here on."""
@@ -61,6 +63,7 @@ class InteractivePhase:
         """One turn of the outer loop: act and learn for an episode, then reward it and store it."""
         references = draw_references(self.reward_model, self.expert, self.rng)
         name = f"agent-{self.counters.episodes:07d}"
+        self._held_steps = 0
         recorder = EpisodeRecorder(name, self.reward_model.reads_environment_reward)
         for step in rollout(self.environment, self._act, episode_seed(self.seed, self.counters.episodes)):
             recorder.add(step)
@@ -76,17 +79,31 @@ class InteractivePhase:
         self.averages.add({"episode/learned_reward": float(rewards.mean())})
 
     @property
+    def cloning_due(self) -> bool:
+        """Whether the Cloning Phase comes next: with demonstrations, once the warm-up is over."""
+        if self.demonstrations is None or self._warming_up:
+            return False
+        config = self.demonstrations.config
+        return self.demonstrations.refreshed_at < 0 or self.counters.cloning_updates < config.cloning_updates
+
+    @property
     def _warming_up(self) -> bool:
         return self.counters.agent_steps < self.agent.config.warm_up_steps or len(self.replay) == 0
 
     def _act(self, observation: Observation) -> Action:
         if self._warming_up:
-            shape = self.environment.action_space.shape
-            return self.rng.uniform(-1.0, 1.0, shape).astype(np.float32)
+            return self._random_action()
         return self.agent.act(observation, self.budget.scheduled_steps(self.counters), explore=True)
 
+    def _random_action(self) -> Action:
+        if self._held_steps == 0:
+            self._held_steps = int(self.rng.integers(1, self.agent.config.warm_up_hold + 1))
+            self._held_action = self.rng.uniform(-1.0, 1.0, self._held_action.shape).astype(np.float32)
+        self._held_steps -= 1
+        return self._held_action
+
     def _update_agent(self) -> None:
-        if self._warming_up or self.counters.agent_steps % self.agent.config.update_every:
+        if self._warming_up or self.cloning_due or self.counters.agent_steps % self.agent.config.update_every:
             return
         batch = self._batch(self.agent.config.batch_size)
         self.averages.add(self.agent.update(batch, self.budget.scheduled_steps(self.counters)))

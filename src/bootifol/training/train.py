@@ -33,6 +33,7 @@ from bootifol.training.checkpoint import (
     restore_generator,
     save_checkpoint,
 )
+from bootifol.training.cloning import cloning_extent, cloning_phase
 from bootifol.training.components import build_components, build_environment, open_demos, reference_rng
 from bootifol.training.interactive import InteractivePhase, evaluation_seeds
 from bootifol.training.interruption import Interruption
@@ -141,12 +142,55 @@ class Run:
         self._checkpoint()
         return True
 
+    def _clone(self, interruption: Interruption) -> bool:
+        demonstrations = self.components.demonstrations
+        assert demonstrations is not None
+        averages = Averages()
+        log_every = self.run.training.interactive.log_every
+        done, total = cloning_extent(demonstrations, self.counters)
+        phase = cloning_phase(
+            self.components.agent,
+            demonstrations,
+            self.components.replay,
+            self.components.reward_model,
+            self.rng,
+            self.budget,
+            self.counters,
+        )
+        with progress("cloning the videos (gradient steps)", total, done) as advance:
+            for metrics in phase:
+                averages.add(metrics)
+                done += 1
+                advance(1, **metrics)
+                if done % log_every == 0 or done == total:
+                    self._log("cloning", "gradient_step", done, averages.pop())
+                if interruption.requested:
+                    return self._stop()
+                self._checkpoint_if_due()
+        self._evaluate_while_training()
+        return True
+
     def _interact(self, interruption: Interruption) -> bool:
+        counters = self.counters
+        while not self.budget.ended(counters):
+            phase = self._clone if self.interactive.cloning_due else self._act_and_learn
+            if not phase(interruption):
+                return False
+        frames = counters.agent_steps * self.task.action_repeat
+        self.console.print(
+            f"{counters.agent_steps:,} agent steps ({frames:,} environment frames), {counters.agent_updates:,} "
+            f"updates of the agent and {counters.reward_updates:,} of the reward, after "
+            f"{counters.alignment_steps:,} of alignment"
+        )
+        self._checkpoint()
+        return True
+
+    def _act_and_learn(self, interruption: Interruption) -> bool:
         config, counters = self.run.training, self.counters
         self.interactive.start_clock()
         unit, done, total = self.budget.interactive_extent(counters)
         with progress(f"acting and learning ({unit})", total, done) as advance:
-            while not self.budget.ended(counters):
+            while not (self.budget.ended(counters) or self.interactive.cloning_due):
                 logged = counters.agent_steps // config.interactive.log_every
                 self.interactive.play_episode()
                 if counters.agent_steps // config.interactive.log_every > logged:
@@ -162,13 +206,6 @@ class Run:
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()
-        frames = counters.agent_steps * self.task.action_repeat
-        self.console.print(
-            f"{counters.agent_steps:,} agent steps ({frames:,} environment frames), {counters.agent_updates:,} "
-            f"updates of the agent and {counters.reward_updates:,} of the reward, after "
-            f"{counters.alignment_steps:,} of alignment"
-        )
-        self._checkpoint()
         return True
 
     def _evaluate_while_training(self) -> None:

@@ -1,0 +1,64 @@
+"""Cloning Phase: the policy starts as a clone of the expert videos, with inferred actions.
+
+It goes beyond the paper, and only runs with `demonstrations` have it. It follows the agent's warm-up, whose steps are
+what the inverse dynamics learns from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bootifol.agents.drqv2 import DrQv2
+from bootifol.replay.buffer import ReplayBuffer
+from bootifol.rewards.base import RewardModel
+from bootifol.training.budget import Budget, Counters, Stopwatch
+from bootifol.training.demonstrations import Demonstrations
+from bootifol.types import Metrics
+
+
+def cloning_phase(
+    agent: DrQv2,
+    demonstrations: Demonstrations,
+    agent_replay: ReplayBuffer,
+    reward_model: RewardModel,
+    rng: np.random.Generator,
+    budget: Budget,
+    counters: Counters,
+) -> Iterator[Metrics]:
+    """Learns the inverse dynamics, names the videos' actions and rewards, and clones them.
+
+    Args:
+        agent: its encoder and actor are trained.
+        demonstrations: the expert videos.
+        agent_replay: the agent's own steps, of its warm-up.
+        reward_model: rewards the expert videos.
+        rng: draws batches and references.
+        budget: a run whose time is over ends the phase.
+        counters: `inverse_dynamics_updates`, `cloning_updates` and `interactive_seconds` are kept up to date.
+
+    Yields:
+        The metrics of each gradient step.
+    """
+    watch = Stopwatch()
+    while (
+        not budget.ended(counters) and counters.inverse_dynamics_updates < demonstrations.config.first_updates
+    ):
+        metrics = demonstrations.learn_inverse_dynamics(agent_replay, rng)
+        counters.inverse_dynamics_updates += 1
+        counters.interactive_seconds += watch.lap()
+        yield metrics
+    if demonstrations.refreshed_at < 0:
+        demonstrations.refresh(counters.agent_steps, reward_model, rng)
+    while not budget.ended(counters) and counters.cloning_updates < demonstrations.config.cloning_updates:
+        metrics = agent.clone(demonstrations.sample(agent.config.batch_size, rng))
+        counters.cloning_updates += 1
+        counters.interactive_seconds += watch.lap()
+        yield metrics
+
+
+def cloning_extent(demonstrations: Demonstrations, counters: Counters) -> tuple[int, int]:
+    """Gradient steps of the phase that are done, and how many there are."""
+    done = counters.inverse_dynamics_updates + counters.cloning_updates
+    return done, demonstrations.config.first_updates + demonstrations.config.cloning_updates
