@@ -1,10 +1,14 @@
-"""What does each departure from the paper bring? Variants at equal wall-clock on a task drawn with numpy.
+"""What does each departure from the paper bring? Variants of a preset at equal wall-clock.
 
     bootifol demos record --task drawn_home --agent-size 32 --video-size 32 --episodes 150 --out demos/drawn_home
     python -m benchmarks.remedies --demos demos/drawn_home --time-budget 90s --out results/drawn_home/remedies.csv
 
-Every variant gets the same time for both phases, learning only from videos. Seeds are the outer loop, so that a machine
-that is busy for a while slows all variants alike. Finished rows are kept: the same command goes on where it stopped.
+    python -m benchmarks.remedies --task reacher_hard --preset cpu --demos demos/reacher_hard --time-budget 25m \
+        --variants preset "without demonstrations" --runs runs/remedies --out results/reacher_hard/remedies.csv
+
+Every variant gets the same time for all phases, and learns only from videos (except `environment`, the upper bound).
+Seeds are the outer loop, so that a machine that is busy for a while slows all variants alike. Finished rows are kept:
+the same command goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -20,11 +24,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from bootifol.agents.drqv2 import DrQv2Config
 from bootifol.envs.rollout import Act
 from bootifol.evaluation.returns import evaluate, scaled_return
 from bootifol.evaluation.summary import summarize
 from bootifol.files import written_aside
-from bootifol.presets import DRAWN
+from bootifol.presets import preset
 from bootifol.rewards.registry import RewardConfig
 from bootifol.tasks import make_environment, task_named
 from bootifol.training.budget import parse_duration
@@ -42,8 +47,29 @@ def _reward(config: TrainingConfig, **fields: object) -> TrainingConfig:
     return replace(config, reward=RewardConfig(replace(config.reward.bootifol, **fields)))  # type: ignore[arg-type]
 
 
+def _without_demonstrations(config: TrainingConfig) -> TrainingConfig:
+    """The agent as in the paper: nothing inferred, nothing cloned, its own warm-up and noise."""
+    paper = DrQv2Config()
+    agent = replace(
+        config.agent,
+        cloning_weight=0.0,
+        warm_up_steps=paper.warm_up_steps,
+        warm_up_hold=paper.warm_up_hold,
+        exploration_start=paper.exploration_start,
+    )
+    return replace(config, agent=agent, demonstrations=DemonstrationConfig())
+
+
 VARIANTS: dict[str, Callable[[TrainingConfig], TrainingConfig]] = {
-    "preset drawn": lambda config: config,
+    "preset": lambda config: config,
+    "without demonstrations": _without_demonstrations,
+    "without demonstrations, spoiled_share 0.5": lambda config: _reward(
+        _without_demonstrations(config), spoiled_share=0.5
+    ),
+    "without demonstrations, relabel_episodes 4": lambda config: replace(
+        _without_demonstrations(config), interactive=replace(config.interactive, relabel_episodes=4)
+    ),
+    "environment": _without_demonstrations,
     "without saturation_weight": lambda config: replace(
         config, agent=replace(config.agent, saturation_weight=0.0)
     ),
@@ -57,7 +83,9 @@ VARIANTS: dict[str, Callable[[TrainingConfig], TrainingConfig]] = {
     ),
     "demonstrations 1/4, cloning 0.5": lambda config: replace(
         config,
-        demonstrations=DemonstrationConfig(share=0.25, videos=100, first_updates=300, updates=50),
+        demonstrations=DemonstrationConfig(
+            share=0.25, videos=100, first_updates=300, cloning_updates=0, updates=50, refresh_every=2000
+        ),
         agent=replace(config.agent, cloning_weight=0.5),
     ),
 }
@@ -69,10 +97,14 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--task", default="drawn_home")
+    parser.add_argument("--preset", default="drawn")
     parser.add_argument("--demos", type=Path, required=True)
     parser.add_argument("--time-budget", default="90s", help="of each run")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=list(VARIANTS))
+    parser.add_argument(
+        "--runs", type=Path, help="where to keep the runs and their curves; without it they go"
+    )
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
@@ -86,7 +118,11 @@ def main() -> None:
         for variant in arguments.variants:
             if (variant, str(seed)) in done:
                 continue
-            rows.append(trained(variant, seed, arguments.task, arguments.demos, arguments.time_budget))
+            with tempfile.TemporaryDirectory() as temporary:
+                directory = (
+                    Path(temporary) if arguments.runs is None else arguments.runs / slug(variant, seed)
+                )
+                rows.append(trained(arguments, variant, seed, directory))
             console.print(rows[-1])
             with written_aside(arguments.out) as aside, aside.open("w", newline="") as file:
                 writer = csv.DictWriter(file, COLUMNS)
@@ -95,26 +131,36 @@ def main() -> None:
     console.print(table(rows))
 
 
-def trained(variant: str, seed: int, task: str, demos: Path, time_budget: str) -> dict[str, str]:
+def slug(variant: str, seed: int) -> str:
+    """The name of a variant's run directory."""
+    return "-".join([*variant.replace(",", "").replace("/", "").split(), f"seed{seed}"])
+
+
+def trained(arguments: argparse.Namespace, variant: str, seed: int, directory: Path) -> dict[str, str]:
     """One run and its policy's return."""
-    config = VARIANTS[variant](DRAWN)
-    config = replace(config, threads=1, tensorboard=False, evaluation=replace(config.evaluation, every=10**9))
-    budget = parse_duration(time_budget)
-    with tempfile.TemporaryDirectory() as directory:
-        run = Run(
-            RunConfig(task, "bootifol", "drawn", seed, str(demos), budget, config),
-            Path(directory),
-            Console(quiet=True),
-        )
-        if not run.learn():
-            raise SystemExit("interrupted; the same command goes on with this run")
-        agent, counters = run.components.agent, run.counters
+    config = replace(VARIANTS[variant](preset(arguments.preset)), threads=1, tensorboard=False)
+    if arguments.runs is None:
+        config = replace(config, evaluation=replace(config.evaluation, every=10**9))
+    described = RunConfig(
+        arguments.task,
+        "environment" if variant == "environment" else "bootifol",
+        arguments.preset,
+        seed,
+        str(arguments.demos),
+        parse_duration(arguments.time_budget),
+        config,
+    )
+    run = Run(described, directory, Console(quiet=True))
+    described.write(directory, ["python", "-m", "benchmarks.remedies"])
+    if not run.learn():
+        raise SystemExit("interrupted; the same command goes on with this run")
+    agent, counters = run.components.agent, run.counters
     act: Act = lambda observation: agent.act(observation, 0, explore=False)  # noqa: E731
-    described = task_named(task)
-    environment = make_environment(task, config.pictures, described.evaluation_steps)
+    task = task_named(arguments.task)
+    environment = make_environment(arguments.task, config.pictures, task.evaluation_steps)
     results = evaluate(environment, act, evaluation_seeds(seed, EPISODES))
     mean = float(np.mean([result.environment_return for result in results]))
-    scaled = scaled_return(mean, expert_return=described.expert_return, random_return=described.random_return)
+    scaled = scaled_return(mean, expert_return=task.expert_return, random_return=task.random_return)
     return {
         "variant": variant,
         "seed": str(seed),

@@ -8,11 +8,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from tiny_runs import new_run
+from tiny_runs import TINY, WITH_DEMONSTRATIONS, new_run
 
 from bootifol.envs.rollout import play_episode
 from bootifol.errors import BootifolError
 from bootifol.training import components
+from bootifol.training.config import TrainingConfig
 
 
 class NaNReward(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -29,15 +30,16 @@ def nan_rewards(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(components, "make_environment", lambda *arguments: NaNReward(make(*arguments)))
 
 
+@pytest.mark.parametrize("config", [TINY, WITH_DEMONSTRATIONS], ids=["paper", "demonstrations"])
 def test_nan_rewards_give_the_same_policy_bit_for_bit(
-    tmp_path: Path, demos: Path, request: pytest.FixtureRequest
+    tmp_path: Path, demos: Path, request: pytest.FixtureRequest, config: TrainingConfig
 ) -> None:
-    usual = new_run(tmp_path / "usual", demos)
+    usual = new_run(tmp_path / "usual", demos, config=config)
     assert usual.learn()
     request.getfixturevalue("nan_rewards")
-    poisoned = new_run(tmp_path / "poisoned", demos)
+    poisoned = new_run(tmp_path / "poisoned", demos, config=config)
     assert np.isnan(play_episode(poisoned.environment, poisoned.interactive._act, 1, "x").environment_return)
-    poisoned = new_run(tmp_path / "again", demos)
+    poisoned = new_run(tmp_path / "again", demos, config=config)
     assert poisoned.learn()
     for name, component in usual.components.stateful().items():
         theirs = poisoned.components.stateful()[name].state()
@@ -49,3 +51,10 @@ def test_the_upper_bound_does_read_it(tmp_path: Path, demos: Path, nan_rewards: 
     """The counterpart: without it, the test above could pass because nothing learns."""
     with pytest.raises(BootifolError, match="finite"):
         new_run(tmp_path / "run", demos, method="environment").learn()
+
+
+def test_the_upper_bound_has_no_demonstrations(tmp_path: Path, demos: Path) -> None:
+    """They would need the rewards of an expert's videos, and no video tells them."""
+    run = new_run(tmp_path / "run", demos, method="environment", config=WITH_DEMONSTRATIONS)
+    assert run.components.demonstrations is None
+    assert run.learn()

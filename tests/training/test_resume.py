@@ -4,29 +4,20 @@ from __future__ import annotations
 
 import os
 import signal
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_runs import TINY, new_run, resumed
+from tiny_runs import TINY, WITH_DEMONSTRATIONS, new_run, resumed
 
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.errors import BootifolError
 from bootifol.files import read_arrays, read_json
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.config import TrainingConfig
-from bootifol.training.demonstrations import DemonstrationConfig, Demonstrations
+from bootifol.training.demonstrations import Demonstrations
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.train import Run
-
-WITH_DEMONSTRATIONS = replace(
-    TINY,
-    agent=replace(TINY.agent, cloning_weight=1.0),
-    demonstrations=DemonstrationConfig(
-        share=0.5, videos=4, first_updates=3, cloning_updates=4, updates=1, refresh_every=60, batch_size=8
-    ),
-)
 
 
 def signal_at(monkeypatch: pytest.MonkeyPatch, number: signal.Signals, episode: int) -> None:

@@ -12,6 +12,7 @@ from bootifol.envs.pictures import PictureConfig
 from bootifol.presets import SMOKE
 from bootifol.rewards.registry import RewardConfig
 from bootifol.training.config import AlignmentConfig, InteractiveConfig, TrainingConfig
+from bootifol.training.demonstrations import DemonstrationConfig
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 
@@ -43,6 +44,15 @@ TINY = replace(
     ),
     evaluation=replace(SMOKE.evaluation, every=120, held_out_videos=2),
 )
+
+WITH_DEMONSTRATIONS = replace(
+    TINY,
+    agent=replace(TINY.agent, warm_up_hold=4, cloning_weight=1.0),
+    demonstrations=DemonstrationConfig(
+        share=0.5, videos=4, first_updates=3, cloning_updates=4, updates=1, refresh_every=60, batch_size=8
+    ),
+)
+"""The same, starting as a clone of the expert videos."""
 
 
 def record_demos(directory: Path) -> Path:

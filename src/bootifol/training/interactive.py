@@ -126,6 +126,8 @@ class InteractivePhase:
             return
         self.averages.add(self.reward_model.update(self.expert, self.agent_videos))
         self.counters.reward_updates += 1
+        if self.reward_model.reads_environment_reward:
+            return  # true rewards do not go stale
         for _ in range(self.config.relabel_episodes):
             self._relabel_one()
 

@@ -1,0 +1,168 @@
+"""Expert videos as experience: what is inferred from them, what is drawn, what the warm-up gives to learn from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_runs import WITH_DEMONSTRATIONS, new_run
+
+from bootifol.agents.inverse_dynamics import InverseDynamics
+from bootifol.errors import BootifolError
+from bootifol.replay.buffer import ReplayBuffer
+from bootifol.training.demonstrations import DemonstrationConfig, Demonstrations
+from bootifol.types import Arrays, Episode, FrameBatch, Frames, Metrics, Video, VideoSource
+
+SIZE, STEPS, MOVES = 32, 12, 4
+CONFIG = DemonstrationConfig(share=0.5, batch_size=32)
+
+
+def sliding_square(seed: int, actions: np.ndarray) -> Frames:
+    """A bright square that action 0 slides right, or left where it is negative."""
+    frames = np.zeros((len(actions) + 1, SIZE, SIZE, 3), np.uint8)
+    rng = np.random.default_rng(seed)
+    x, y = float(rng.integers(8, 16)), int(rng.integers(4, 20))
+    for frame, move in zip(frames, [*actions[:, 0], 0.0], strict=True):
+        frame[y : y + 8, round(x) : round(x) + 8] = 255
+        x = float(np.clip(x + 2 * move, 0, 24))
+    return frames
+
+
+class Videos:
+    """Videos that move for MOVES steps and then rest."""
+
+    def __init__(self, count: int) -> None:
+        self.actions = np.zeros((count, STEPS, 1), np.float32)
+        self.actions[:, :MOVES] = 1.0
+        self.videos = [
+            Video(f"expert-{n}", sliding_square(n, actions)) for n, actions in enumerate(self.actions)
+        ]
+
+    def __len__(self) -> int:
+        return len(self.videos)
+
+    def __getitem__(self, index: int) -> Video:
+        return self.videos[index]
+
+    def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
+        return np.stack([video.frames for video in self.videos[:count]])
+
+
+class CountingReward:
+    """Rewards a video with its number."""
+
+    reads_environment_reward = False
+    reference_count = 1
+    version = 0
+
+    def state(self) -> Arrays:
+        return {}
+
+    def load_state(self, arrays: Arrays) -> None:
+        pass
+
+    def label(self, video: Video, references: Sequence[Video]) -> np.ndarray:
+        return np.full(len(video.frames) - 1, float(video.name.removeprefix("expert-")), np.float32)
+
+    def align(self, expert: VideoSource, random: VideoSource) -> Iterator[Metrics]:
+        raise NotImplementedError
+
+    def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:
+        raise NotImplementedError
+
+
+def make_demonstrations(config: DemonstrationConfig, count: int = 6) -> Demonstrations:
+    replay = ReplayBuffer(count * (STEPS + 1), SIZE, 1, stack=2, n_step=1, shift=0)
+    inverse_dynamics = InverseDynamics("strided", SIZE, 2, 1, 1, seed=1, learning_rate=2e-3, hidden_dim=64)
+    return Demonstrations(config, Videos(count), replay, inverse_dynamics, SIZE, 1)
+
+
+def agent_steps() -> ReplayBuffer:
+    """Random slides of the same square."""
+    replay = ReplayBuffer(2000, SIZE, 1, stack=2, n_step=1, shift=0)
+    rng = np.random.default_rng(0)
+    for number in range(60):
+        actions = rng.choice([-1.0, 0.0, 1.0], size=(STEPS, 1)).astype(np.float32)
+        frames = sliding_square(100 + number, actions)
+        replay.add(Episode(frames, actions, Video("agent", frames), False), np.zeros(STEPS, np.float32))
+    return replay
+
+
+def test_actions_and_rewards_of_the_videos_are_inferred() -> None:
+    demonstrations, replay, rng = make_demonstrations(CONFIG), agent_steps(), np.random.default_rng(0)
+    for _ in range(100):
+        demonstrations.learn_inverse_dynamics(replay, rng)
+    demonstrations.refresh(0, CountingReward(), rng)
+    everything = demonstrations.replay.sample(6 * STEPS, rng, transitions=np.arange(6 * STEPS))
+    shown = everything.action.numpy().reshape(6, STEPS)
+    assert np.abs(shown[:, :MOVES] - 1).mean() < 0.3
+    assert np.abs(shown[:, MOVES:]).mean() < 0.3
+    np.testing.assert_array_equal(everything.reward.numpy().reshape(6, STEPS)[:, 0], np.arange(6))
+
+
+@pytest.mark.parametrize(("moving_share", "expected"), [(0.75, 0.75), (1.0, 1.0), (0.0, 0.0)])
+def test_transitions_are_drawn_by_movement(moving_share: float, expected: float) -> None:
+    demonstrations = make_demonstrations(replace(CONFIG, moving_share=moving_share, history_dropout=0.0))
+    batch = demonstrations.sample(64, np.random.default_rng(0))
+    moves = (batch.next_observation[:, 3:] != batch.observation[:, 3:]).flatten(1).any(dim=1)
+    assert float(moves.float().mean()) == expected
+
+
+def test_videos_without_movement_can_be_drawn_from() -> None:
+    replay = ReplayBuffer(STEPS + 1, SIZE, 1, stack=2, n_step=1, shift=0)
+    videos = Videos(1)
+    videos.videos = [Video("expert-0", np.zeros((STEPS + 1, SIZE, SIZE, 3), np.uint8))]
+    inverse_dynamics = InverseDynamics("strided", SIZE, 2, 1, 1, seed=1, hidden_dim=16)
+    demonstrations = Demonstrations(CONFIG, videos, replay, inverse_dynamics, SIZE, 1)
+    assert len(demonstrations.sample(8, np.random.default_rng(0)).reward) == 8
+
+
+def test_a_mixed_batch_says_which_rows_are_demonstrated() -> None:
+    demonstrations, rng = make_demonstrations(replace(CONFIG, share=0.25)), np.random.default_rng(0)
+    demonstrations.refresh(0, CountingReward(), rng)
+    batch = demonstrations.mixed(agent_steps(), 16, rng)
+    assert batch.demonstrated is not None
+    assert batch.demonstrated.tolist() == [False] * 12 + [True] * 4
+    assert (batch.reward[:12] == 0).all()
+
+
+def test_pictures_are_not_saved_twice() -> None:
+    """They are the demo set's; a checkpoint holds what was inferred."""
+    demonstrations, rng = make_demonstrations(CONFIG), np.random.default_rng(0)
+    demonstrations.refresh(7, CountingReward(), rng)
+    state = demonstrations.state()
+    assert not any("frames" in name for name in state)
+    restored = make_demonstrations(CONFIG)
+    restored.load_state({name: array.copy() for name, array in state.items()})
+    assert restored.refreshed_at == 7
+    one, other = (d.sample(16, np.random.default_rng(3)) for d in (demonstrations, restored))
+    np.testing.assert_array_equal(one.action, other.action)
+    np.testing.assert_array_equal(one.reward, other.reward)
+    np.testing.assert_array_equal(one.observation, other.observation)
+
+
+def test_warm_up_actions_are_held(tmp_path: Path, demos: Path) -> None:
+    config = replace(
+        WITH_DEMONSTRATIONS, agent=replace(WITH_DEMONSTRATIONS.agent, warm_up_steps=240, warm_up_hold=5)
+    )
+    run = new_run(tmp_path / "run", demos, config=config)
+    run.interactive.play_episode()
+    transitions = np.arange(len(run.components.replay))
+    actions = run.components.replay.sample(
+        len(transitions), np.random.default_rng(0), transitions=transitions
+    ).action.numpy()
+    changes = np.flatnonzero((actions[1:] != actions[:-1]).any(axis=1)) + 1
+    held = np.diff([0, *changes])
+    assert held.max() <= 5 and len(set(held)) > 2
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("share", 1.0), ("moving_share", 1.1), ("history_dropout", -0.1), ("cloning_updates", -1)],
+)
+def test_mistakes_are_sentences(field: str, value: float) -> None:
+    with pytest.raises(BootifolError, match=field):
+        DemonstrationConfig(**{field: value})  # type: ignore[arg-type]
