@@ -16,6 +16,7 @@ from bootifol.training.config import (
     InteractiveConfig,
     TrainingConfig,
 )
+from bootifol.training.demonstrations import DemonstrationConfig
 
 PresetName = Literal["paper", "cpu", "demo", "drawn", "smoke"]
 
@@ -41,34 +42,40 @@ CPU = TrainingConfig(
         encoder="strided",
         hidden_dim=512,
         batch_size=128,
-        exploration_steps=30_000,
+        warm_up_steps=6000,
+        warm_up_hold=10,
+        exploration_start=0.4,
+        exploration_steps=10_000,
         saturation_weight=0.01,
-        replay_capacity=100_000,
+        cloning_weight=2.5,
+        replay_capacity=60_000,
     ),
-    alignment=AlignmentConfig(gradient_steps=1500),
+    alignment=AlignmentConfig(gradient_steps=500),
     interactive=InteractiveConfig(
-        agent_steps=150_000,
-        reward_updates_until=75_000,
-        agent_videos=1500,
+        agent_steps=50_000,
+        reward_updates_until=25_000,
+        agent_videos=900,
     ),
-    evaluation=EvaluationConfig(every=10_000, final_episodes=50),
+    demonstrations=DemonstrationConfig(share=0.25),
+    evaluation=EvaluationConfig(every=5000, final_episodes=50),
 )
-"""The same algorithm with smaller networks, pictures and counts: meant for 3 hours on 2 cores and 8 GB.
+"""The same algorithm with smaller networks, pictures and counts: an hour or two on 2 cores and 8 GB.
 
 Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
-`motion`, `sequence_times`, `references` and `reward_scale` of the reward model and `saturation_weight` of the agent,
-each described at its field.
+`motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `saturation_weight` and
+`cloning_weight` of the agent, and `demonstrations`, by which the policy starts as a clone of the videos; each is
+described at its field.
 """
 
 DEMO = replace(
     CPU,
-    agent=replace(CPU.agent, replay_capacity=50_000),
-    alignment=AlignmentConfig(gradient_steps=1500, time_share=0.4),
-    interactive=replace(CPU.interactive, agent_videos=800),
-    evaluation=EvaluationConfig(every=10_000, long_episodes=1, final_episodes=10),
+    agent=replace(CPU.agent, replay_capacity=20_000),
+    alignment=AlignmentConfig(gradient_steps=500, time_share=0.25),
+    interactive=replace(CPU.interactive, agent_videos=300),
+    evaluation=EvaluationConfig(every=2500, long_episodes=1, final_episodes=10),
     checkpoint_minutes=5.0,
 )
-"""For `make demo`: `cpu` in minutes, most of them for the reward, whose result can be seen so soon."""
+"""For `make demo`: `cpu` in minutes."""
 
 DRAWN = replace(
     CPU,
@@ -79,6 +86,8 @@ DRAWN = replace(
         hidden_dim=128,
         batch_size=64,
         warm_up_steps=600,
+        warm_up_hold=1,
+        exploration_start=1.0,
         exploration_steps=2250,
         replay_capacity=10_000,
         learning_rate=5e-4,
@@ -86,7 +95,9 @@ DRAWN = replace(
         target_rate=0.02,
         shift=2,
         saturation_weight=0.1,
+        cloning_weight=0.0,
     ),
+    demonstrations=DemonstrationConfig(),
     alignment=AlignmentConfig(gradient_steps=150, time_share=0.25, log_every=10),
     interactive=InteractiveConfig(
         agent_steps=4500, reward_updates_until=2250, agent_videos=150, log_every=250
@@ -95,8 +106,8 @@ DRAWN = replace(
         every=750, episodes=5, long_episodes=5, final_episodes=50, held_out_videos=16
     ),
 )
-"""For the tasks drawn with numpy, at 32 pixels: a policy from videos in two minutes, and no simulator. The learning
-test runs it."""
+"""For the tasks drawn with numpy, at 32 pixels: a policy from videos in two minutes, without a simulator and with nothing
+cloned. The learning test runs it."""
 
 SMOKE = replace(
     CPU,
@@ -111,6 +122,9 @@ SMOKE = replace(
     ),
     alignment=AlignmentConfig(gradient_steps=60, log_every=5),
     interactive=InteractiveConfig(agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150),
+    demonstrations=replace(
+        CPU.demonstrations, videos=50, first_updates=60, cloning_updates=60, updates=20, refresh_every=500
+    ),
     evaluation=EvaluationConfig(
         every=450, episodes=1, long_episodes=1, final_episodes=2, held_out_videos=6, showcase_episodes=2
     ),

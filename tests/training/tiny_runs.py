@@ -30,6 +30,8 @@ TINY = replace(
         hidden_dim=16,
         batch_size=8,
         warm_up_steps=60,
+        warm_up_hold=1,
+        cloning_weight=0.0,
         update_every=5,
         replay_capacity=600,
     ),
@@ -42,6 +44,7 @@ TINY = replace(
         relabel_episodes=1,
         log_every=60,
     ),
+    demonstrations=DemonstrationConfig(),
     evaluation=replace(SMOKE.evaluation, every=120, held_out_videos=2),
 )
 
