@@ -106,8 +106,8 @@ DRAWN = replace(
         every=750, episodes=5, long_episodes=5, final_episodes=50, held_out_videos=16
     ),
 )
-"""For the tasks drawn with numpy, at 32 pixels: a policy from videos in two minutes, without a simulator and with nothing
-cloned. The learning test runs it."""
+"""For the tasks drawn with numpy, at 32 pixels: a policy from videos in two minutes, without a simulator and
+with nothing cloned. The learning test runs it."""
 
 SMOKE = replace(
     CPU,
