@@ -84,7 +84,7 @@ VARIANTS: dict[str, Callable[[TrainingConfig], TrainingConfig]] = {
     "demonstrations 1/4, cloning 0.5": lambda config: replace(
         config,
         demonstrations=DemonstrationConfig(
-            share=0.25, videos=100, first_updates=300, cloning_updates=0, updates=50, refresh_every=2000
+            share=0.25, videos=100, inverse_dynamics_updates=300, cloning_updates=0, repeat_every=2000
         ),
         agent=replace(config.agent, cloning_weight=0.5),
     ),

@@ -47,7 +47,7 @@ CPU = TrainingConfig(
         exploration_start=0.4,
         exploration_steps=10_000,
         saturation_weight=0.01,
-        cloning_weight=2.5,
+        cloning_weight=10.0,
         replay_capacity=60_000,
     ),
     alignment=AlignmentConfig(gradient_steps=500),
@@ -123,7 +123,7 @@ SMOKE = replace(
     alignment=AlignmentConfig(gradient_steps=60, log_every=5),
     interactive=InteractiveConfig(agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150),
     demonstrations=replace(
-        CPU.demonstrations, videos=50, first_updates=60, cloning_updates=60, updates=20, refresh_every=500
+        CPU.demonstrations, videos=50, inverse_dynamics_updates=60, cloning_updates=60, repeat_every=500
     ),
     evaluation=EvaluationConfig(
         every=450, episodes=1, long_episodes=1, final_episodes=2, held_out_videos=6, showcase_episodes=2

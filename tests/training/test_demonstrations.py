@@ -137,11 +137,23 @@ def test_pictures_are_not_saved_twice() -> None:
     assert not any("frames" in name for name in state)
     restored = make_demonstrations(CONFIG)
     restored.load_state({name: array.copy() for name, array in state.items()})
-    assert restored.refreshed_at == 7
+    assert (restored.refreshes, restored.refreshed_at) == (1, 7)
     one, other = (d.sample(16, np.random.default_rng(3)) for d in (demonstrations, restored))
     np.testing.assert_array_equal(one.action, other.action)
     np.testing.assert_array_equal(one.reward, other.reward)
     np.testing.assert_array_equal(one.observation, other.observation)
+
+
+def test_cloning_phases_come_when_they_are_due(tmp_path: Path, demos: Path) -> None:
+    """60 steps of warm-up, then one phase, and another each 60 agent steps with half as many gradient steps."""
+    run = new_run(tmp_path / "run", demos, config=WITH_DEMONSTRATIONS)
+    assert run.learn()
+    counters = run.counters
+    assert (counters.agent_steps, counters.cloning_phases) == (240, 3)
+    assert counters.inverse_dynamics_updates == 3 + 2 * 2
+    assert counters.cloning_updates == 4 + 2 * 2
+    assert run.components.demonstrations is not None
+    assert run.components.demonstrations.refreshed_at == 180
 
 
 def test_warm_up_actions_are_held(tmp_path: Path, demos: Path) -> None:

@@ -19,9 +19,12 @@ class Counters:
     agent_updates: int = 0
     reward_updates: int = 0
     evaluations: int = 0
+    cloning_phases: int = 0
+    """Begun so far."""
     inverse_dynamics_updates: int = 0
-    """Of the Cloning Phase; later refreshes are not counted."""
+    """In all Cloning Phases."""
     cloning_updates: int = 0
+    """In all Cloning Phases."""
     alignment_seconds: float = 0.0
     """Wall-clock time spent in the Alignment Phase."""
     interactive_seconds: float = 0.0

@@ -1,7 +1,7 @@
-"""Cloning Phase: the policy starts as a clone of the expert videos, with inferred actions.
+"""Cloning Phase: the policy becomes a clone of the expert videos, with inferred actions.
 
-It goes beyond the paper, and only runs with `demonstrations` have it. It follows the agent's warm-up, whose steps are
-what the inverse dynamics learns from.
+It goes beyond the paper, and only runs with `demonstrations` have it: once when the agent's warm-up ends, whose steps
+are what the inverse dynamics learns from, and again whenever there are enough newer ones.
 """
 
 from __future__ import annotations
@@ -42,23 +42,42 @@ def cloning_phase(
         The metrics of each gradient step.
     """
     watch = Stopwatch()
-    while (
-        not budget.ended(counters) and counters.inverse_dynamics_updates < demonstrations.config.first_updates
-    ):
+    config = demonstrations.config
+    if not cloning_in_progress(demonstrations, counters):
+        counters.cloning_phases += 1
+    inverse_dynamics_updates, cloning_updates = config.updates_until(counters.cloning_phases)
+    while not budget.ended(counters) and counters.inverse_dynamics_updates < inverse_dynamics_updates:
         metrics = demonstrations.learn_inverse_dynamics(agent_replay, rng)
         counters.inverse_dynamics_updates += 1
         counters.interactive_seconds += watch.lap()
         yield metrics
-    if demonstrations.refreshed_at < 0:
+    if demonstrations.refreshes < counters.cloning_phases:
         demonstrations.refresh(counters.agent_steps, reward_model, rng)
-    while not budget.ended(counters) and counters.cloning_updates < demonstrations.config.cloning_updates:
+    while not budget.ended(counters) and counters.cloning_updates < cloning_updates:
         metrics = agent.clone(demonstrations.sample(agent.config.batch_size, rng))
         counters.cloning_updates += 1
         counters.interactive_seconds += watch.lap()
         yield metrics
 
 
+def cloning_in_progress(demonstrations: Demonstrations, counters: Counters) -> bool:
+    """Whether a Cloning Phase was begun and has not ended."""
+    done = counters.inverse_dynamics_updates, counters.cloning_updates
+    return (
+        done != demonstrations.config.updates_until(counters.cloning_phases)
+        or demonstrations.refreshes < counters.cloning_phases
+    )
+
+
+def cloning_due(demonstrations: Demonstrations, counters: Counters) -> bool:
+    """Whether a Cloning Phase comes next, once the warm-up is over."""
+    if counters.cloning_phases == 0 or cloning_in_progress(demonstrations, counters):
+        return True
+    return counters.agent_steps - demonstrations.refreshed_at >= demonstrations.config.repeat_every
+
+
 def cloning_extent(demonstrations: Demonstrations, counters: Counters) -> tuple[int, int]:
-    """Gradient steps of the phase that are done, and how many there are."""
-    done = counters.inverse_dynamics_updates + counters.cloning_updates
-    return done, demonstrations.config.first_updates + demonstrations.config.cloning_updates
+    """Gradient steps of the phase that is due: how many are done, and how many there are."""
+    phases = counters.cloning_phases + (not cloning_in_progress(demonstrations, counters))
+    before, until = (sum(demonstrations.config.updates_until(count)) for count in (phases - 1, phases))
+    return counters.inverse_dynamics_updates + counters.cloning_updates - before, until - before

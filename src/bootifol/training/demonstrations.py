@@ -46,32 +46,40 @@ class DemonstrationConfig:
     history_dropout: float = 0.8
     """Share of the observations drawn from expert videos whose stack repeats its newest frame."""
 
-    first_updates: int = 1500
-    """Gradient steps of the inverse dynamics when the agent's warm-up ends."""
+    inverse_dynamics_updates: int = 1500
+    """Gradient steps of the inverse dynamics in the first Cloning Phase, when the agent's warm-up ends."""
 
     cloning_updates: int = 4000
-    """Gradient steps of encoder and actor towards the inferred actions, after those of the inverse dynamics."""
+    """Gradient steps of encoder and actor towards the inferred actions in the first Cloning Phase."""
 
-    updates: int = 200
-    """Gradient steps of the inverse dynamics at each later refresh."""
+    repeat_every: int = 6000
+    """Agent steps from one Cloning Phase to the next: the inverse dynamics has newer steps to learn from, and every
+    demonstration gets its actions and rewards anew."""
 
-    refresh_every: int = 10_000
-    """Agent steps between two refreshes: the inverse dynamics learns from newer steps, and every demonstration gets
-    its actions and rewards anew."""
+    repeat_share: float = 0.5
+    """Gradient steps of each later Cloning Phase, as a share of the first one's."""
 
     batch_size: int = 128
     """Transitions of a gradient step of the inverse dynamics."""
 
     def __post_init__(self) -> None:
-        for name, below in (("share", 1.0), ("moving_share", np.inf), ("history_dropout", np.inf)):
-            if not 0 <= getattr(self, name) < below or getattr(self, name) > 1:
-                border = ")" if below == 1 else "]"
-                raise BootifolError(
-                    f"demonstrations: {name} must be in [0, 1{border}, not {getattr(self, name)}"
-                )
-        names = ("videos", "first_updates", "updates", "refresh_every", "batch_size")
+        if not 0 <= self.share < 1:
+            raise BootifolError(f"demonstrations: share must be in [0, 1), not {self.share}")
+        for name in ("moving_share", "history_dropout", "repeat_share"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise BootifolError(f"demonstrations: {name} must be in [0, 1], not {getattr(self, name)}")
+        names = ("videos", "inverse_dynamics_updates", "repeat_every", "batch_size")
         require_at_least(1, **{f"demonstrations.{name}": getattr(self, name) for name in names})
         require_at_least(0, **{"demonstrations.cloning_updates": self.cloning_updates})
+
+    def updates_until(self, cloning_phases: int) -> tuple[int, int]:
+        """Gradient steps of the inverse dynamics, and of cloning, when so many Cloning Phases have ended."""
+        counts = self.inverse_dynamics_updates, self.cloning_updates
+        later = max(cloning_phases - 1, 0)
+        first, second = (
+            count * min(cloning_phases, 1) + later * round(self.repeat_share * count) for count in counts
+        )
+        return first, second
 
 
 class Demonstrations:
@@ -100,8 +108,10 @@ class Demonstrations:
         self.inverse_dynamics = inverse_dynamics
         self.frame_size = frame_size
         self.count = min(config.videos, len(expert))
-        self.refreshed_at = -1
-        """Agent steps at the last refresh; -1 before the first."""
+        self.refreshes = 0
+        """How often actions and rewards have been inferred."""
+        self.refreshed_at = 0
+        """Agent steps when they last were."""
         moving = []
         for index in range(self.count):
             frames = self._at_agent_size(expert[index])
@@ -123,27 +133,8 @@ class Demonstrations:
             rewards = reward_model.label(video, draw_references(reward_model, self.expert, rng))
             actions = self.inverse_dynamics.actions(self._at_agent_size(video))
             self.replay.relabel(episode_id, rewards, actions)
+        self.refreshes += 1
         self.refreshed_at = agent_steps
-
-    def refresh_if_due(
-        self,
-        agent_steps: int,
-        agent_replay: ReplayBuffer,
-        reward_model: RewardModel,
-        rng: np.random.Generator,
-    ) -> Metrics:
-        """Every `refresh_every` agent steps, trains the inverse dynamics further and refreshes the videos.
-
-        Returns:
-            Metrics of the last gradient step, or nothing where no refresh was due.
-        """
-        if agent_steps - self.refreshed_at < self.config.refresh_every:
-            return {}
-        metrics: Metrics = {}
-        for _ in range(self.config.updates):
-            metrics = self.learn_inverse_dynamics(agent_replay, rng)
-        self.refresh(agent_steps, reward_model, rng)
-        return metrics
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
         """Transitions of the expert videos, most of them where the picture moves."""
@@ -169,14 +160,14 @@ class Demonstrations:
         return replace(Batch(**joined), demonstrated=rows)
 
     def state(self) -> Arrays:
-        """The inverse dynamics, the inferred actions and rewards, and the time of the last refresh."""
+        """The inverse dynamics, the inferred actions and rewards, how often and when they were."""
         arrays = {f"inverse_dynamics/{name}": array for name, array in self.inverse_dynamics.state().items()}
         stored = self.replay.state()
         return {
             **arrays,
             "actions": stored["actions"],
             "rewards": stored["rewards"],
-            "refreshed_at": np.array([self.refreshed_at], np.int64),
+            "refreshes_and_refreshed_at": np.array([self.refreshes, self.refreshed_at], np.int64),
         }
 
     def load_state(self, arrays: Arrays) -> None:
@@ -188,7 +179,7 @@ class Demonstrations:
         self.replay.load_state(
             {**self.replay.state(), "actions": arrays["actions"], "rewards": arrays["rewards"]}
         )
-        self.refreshed_at = int(arrays["refreshed_at"][0])
+        self.refreshes, self.refreshed_at = (int(value) for value in arrays["refreshes_and_refreshed_at"])
 
     def _at_agent_size(self, video: Video) -> Frames:
         if video.frames.shape[1] == self.frame_size:

@@ -20,6 +20,7 @@ from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
 from bootifol.tracking import Averages
 from bootifol.training.budget import Budget, Counters, Stopwatch
+from bootifol.training.cloning import cloning_due
 from bootifol.training.config import InteractiveConfig
 from bootifol.training.demonstrations import Demonstrations
 from bootifol.types import Action, Batch, Observation, VideoSource
@@ -80,11 +81,10 @@ class InteractivePhase:
 
     @property
     def cloning_due(self) -> bool:
-        """Whether the Cloning Phase comes next: with demonstrations, once the warm-up is over."""
+        """Whether a Cloning Phase comes next: with demonstrations, once the warm-up is over."""
         if self.demonstrations is None or self._warming_up:
             return False
-        config = self.demonstrations.config
-        return self.demonstrations.refreshed_at < 0 or self.counters.cloning_updates < config.cloning_updates
+        return cloning_due(self.demonstrations, self.counters)
 
     @property
     def _warming_up(self) -> bool:
@@ -103,7 +103,9 @@ class InteractivePhase:
         return self._held_action
 
     def _update_agent(self) -> None:
-        if self._warming_up or self.cloning_due or self.counters.agent_steps % self.agent.config.update_every:
+        if self._warming_up or self.counters.agent_steps % self.agent.config.update_every:
+            return
+        if self.demonstrations is not None and not self.demonstrations.refreshes:
             return
         batch = self._batch(self.agent.config.batch_size)
         self.averages.add(self.agent.update(batch, self.budget.scheduled_steps(self.counters)))
@@ -112,11 +114,6 @@ class InteractivePhase:
     def _batch(self, batch_size: int) -> Batch:
         if self.demonstrations is None:
             return self.replay.sample(batch_size, self.rng)
-        self.averages.add(
-            self.demonstrations.refresh_if_due(
-                self.counters.agent_steps, self.replay, self.reward_model, self.rng
-            )
-        )
         return self.demonstrations.mixed(self.replay, batch_size, self.rng)
 
     def _update_reward(self) -> None:

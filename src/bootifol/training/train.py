@@ -163,11 +163,14 @@ class Run:
                 done += 1
                 advance(1, **metrics)
                 if done % log_every == 0 or done == total:
-                    self._log("cloning", "gradient_step", done, averages.pop())
+                    gradient_steps = self.counters.inverse_dynamics_updates + self.counters.cloning_updates
+                    self._log("cloning", "gradient_step", gradient_steps, averages.pop())
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()
-        self._evaluate_while_training()
+        if self.counters.cloning_phases == 1:
+            self._evaluate_while_training()
+            self._checkpoint()
         return True
 
     def _interact(self, interruption: Interruption) -> bool:
