@@ -45,21 +45,21 @@ CPU = TrainingConfig(
         warm_up_steps=6000,
         warm_up_hold=10,
         exploration_start=0.4,
-        exploration_steps=10_000,
+        exploration_steps=6000,
         saturation_weight=0.01,
         cloning_weight=10.0,
-        replay_capacity=60_000,
+        replay_capacity=40_000,
     ),
     alignment=AlignmentConfig(gradient_steps=500),
     interactive=InteractiveConfig(
-        agent_steps=50_000,
-        reward_updates_until=25_000,
-        agent_videos=900,
+        agent_steps=30_000,
+        reward_updates_until=15_000,
+        agent_videos=500,
     ),
     demonstrations=DemonstrationConfig(share=0.25),
-    evaluation=EvaluationConfig(every=5000, final_episodes=50),
+    evaluation=EvaluationConfig(every=2500, long_episodes=5, final_episodes=50),
 )
-"""The same algorithm with smaller networks, pictures and counts: an hour or two on 2 cores and 8 GB.
+"""The same algorithm with smaller networks, pictures and counts: about an hour on 2 cores and 8 GB.
 
 Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
 `motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `saturation_weight` and
