@@ -4,7 +4,8 @@
 
 1. Does the reward rank performances it never saw, from the expert's down to random ones? Performers of every degree
    play: the expert with a share of random actions, late, or with weak actions, and constant actions.
-2. Does the agent follow the reward? Its own newest episodes stand among them.
+2. Does the agent follow the reward? Its own episodes stand among them; and does the reward tell those that reach the
+   goal from those that do not? Where it cannot, it cannot lead the agent from one to the other.
 3. Is the reward stale? The rewards that replay holds, against what the newest reward would give the same episodes.
 
 The environment's reward is read to judge the learned one, after training.
@@ -89,7 +90,7 @@ def performers(task: str, environment: gymnasium.Env[Any, Any]) -> dict[str, Per
     }
 
 
-def judged(run: Run, episodes: int) -> Iterator[Performance]:
+def judged(run: Run, episodes: int, agent_episodes: int) -> Iterator[Performance]:
     """Plays every performer, the agent last."""
     environment = build_environment(run.run, run.task.episode_steps)
     model, agent = run.components.reward_model, run.components.agent
@@ -98,7 +99,7 @@ def judged(run: Run, episodes: int) -> Iterator[Performance]:
     cast = performers(run.run.task, environment)
     cast["agent"] = lambda seed: lambda observation: agent.act(observation, steps, explore=False)
     for name, make in cast.items():
-        for seed in range(episodes):
+        for seed in range(agent_episodes if name == "agent" else episodes):
             played = play_episode(environment, make(seed), 10**6 + seed, f"{name}-{seed}")
             rewards = model.label(played.episode.video, draw_references(model, run.demos.expert, rng))
             yield Performance(name, played.environment_return, rewards)
@@ -127,12 +128,13 @@ def main() -> None:
     )
     parser.add_argument("run", type=Path, help="directory that `bootifol train` wrote")
     parser.add_argument("--episodes", type=int, default=10, help="of each performer")
+    parser.add_argument("--agent-episodes", type=int, default=40, help="of the agent")
     parser.add_argument("--out", type=Path, required=True, help="writes OUT.csv and OUT.png")
     arguments = parser.parse_args()
     run = Run(RunConfig.read(arguments.run), arguments.run, Console(stderr=True))
     performances: list[Performance] = []
-    with progress("judging", total=10 * arguments.episodes) as advance:
-        for performance in judged(run, arguments.episodes):
+    with progress("judging", total=9 * arguments.episodes + arguments.agent_episodes) as advance:
+        for performance in judged(run, arguments.episodes, arguments.agent_episodes):
             performances.append(performance)
             advance(1)
     pairs = staleness(run, 200)
@@ -149,6 +151,7 @@ def main() -> None:
             f"{name:24} return {returns[of_name].mean():7.1f}   learned {learned[of_name].mean():7.1f}"
         )
     console.print(f"rank correlation of learned reward and return, expert and agent left out: {rank:.2f}")
+    console.print(success_and_failure(performances))
     console.print(f"rank correlation of stored and fresh rewards over {len(pairs)} episodes: {stale:.2f}")
 
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
@@ -160,6 +163,24 @@ def main() -> None:
         )
     with written_aside(arguments.out.with_suffix(".png")) as aside:
         draw(performances, pairs, rank, stale, aside)
+
+
+def success_and_failure(performances: list[Performance]) -> str:
+    """How often the reward puts an episode of the agent that earned half of what the expert does above one that did
+    not."""
+    expert = np.mean([p.environment_return for p in performances if p.performer == "expert"])
+    own = [p for p in performances if p.performer == "agent"]
+    reached, missed = (
+        np.array([p.rewards.sum() for p in own if bool(p.environment_return >= expert / 2) == wanted])
+        for wanted in (True, False)
+    )
+    if not (len(reached) and len(missed)):
+        return f"of the agent's {len(own)} episodes {len(reached)} earned half of the expert's return or more"
+    above = float((reached[:, None] > missed[None, :]).mean())
+    return (
+        f"the agent's {len(reached)} episodes that earned half of the expert's return or more are rewarded above its "
+        f"{len(missed)} others in {above:.0%} of pairs (chance: 50%)"
+    )
 
 
 def draw(
