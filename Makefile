@@ -16,9 +16,9 @@ setup: .venv/ready
 	bash scripts/opengl.sh $(BIN)/python
 	touch .venv/ready
 
-# Expert videos in, a reward, a policy and a report out: about 13 minutes on 2 cores.
+# Expert videos in, a reward, a policy and a report out: about 14 minutes on 2 cores.
 demo: .venv/ready
-	$(BIN)/bootifol demos record --task reacher_hard --episodes 300 --out $(DEMO)/videos --workers 2
+	$(BIN)/bootifol demos record --task reacher_hard --episodes 700 --out $(DEMO)/videos --workers 2
 	@if [ -f $(DEMO)/run/config.json ]; then \
 	  $(BIN)/bootifol train --resume $(DEMO)/run; \
 	else \

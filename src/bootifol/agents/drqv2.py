@@ -91,7 +91,7 @@ class DrQv2Config:
 
     cloning_weight: float = 0.0
     """Beyond the paper: how strongly actor and encoder are pulled to the inferred actions of expert videos, relative
-    to the size of Q; 0, as in the paper, not at all. Needs `demonstrations`."""
+    to the mean of |Q| or 1, whichever is larger; 0, as in the paper, not at all. Needs `demonstrations`."""
 
     cloning_learning_rate: float = 5e-4
     """Of Adam for encoder and actor in the Cloning Phase, which only `demonstrations` has."""
@@ -291,7 +291,8 @@ class DrQv2:
         loss_of_critic = critic_loss(q1, q2, target)
         rows = batch.demonstrated if self.config.cloning_weight > 0 else None
         # Times the mean of |Q|, so that one weight suits rewards of any scale (as TD3+BC: Fujimoto and Gu, 2021).
-        cloning_weight = self.config.cloning_weight * q1.detach().abs().mean()
+        # The critic starts near 0, and without a floor its first errors would undo the clone.
+        cloning_weight = self.config.cloning_weight * q1.detach().abs().mean().clamp(min=1.0)
         loss_of_encoder = loss_of_critic
         if rows is not None:
             with self._autocast():

@@ -87,12 +87,16 @@ def build_agent(run: RunConfig, environment: gymnasium.Env[Any, Any]) -> DrQv2:
     )
 
 
-def build_demonstrations(run: RunConfig, expert: VideoSource, action_dim: int) -> Demonstrations | None:
-    """Expert videos as experience, where the configuration wants them."""
+def demonstrated_videos(run: RunConfig, expert: VideoSource) -> int:
+    """How many expert videos become the agent's experience; 0 where the configuration wants none."""
+    config = run.training.demonstrations
+    return min(config.videos, len(expert)) if config.share > 0 else 0
+
+
+def build_demonstrations(run: RunConfig, expert: VideoSource, action_dim: int) -> Demonstrations:
+    """Expert videos as experience."""
     config, agent, pictures = run.training.demonstrations, run.training.agent, run.training.pictures
-    if config.share == 0:
-        return None
-    count = min(config.videos, len(expert))
+    count = demonstrated_videos(run, expert)
     replay = ReplayBuffer(
         count * len(expert[0].frames),
         pictures.agent_size,
@@ -116,16 +120,20 @@ def build_components(
     assert isinstance(environment.action_space, gymnasium.spaces.Box)
     action_dim = environment.action_space.shape[0]
     frames = task_named(run.task).episode_steps + 1
-    replay_bytes = ReplayBuffer.bytes_needed(config.agent.replay_capacity, pictures.agent_size, action_dim)
-    video_bytes = AgentVideos.bytes_needed(config.interactive.agent_videos, frames, pictures.video_size)
-    console.print(
-        f"memory when full: replay {replay_bytes / 1e9:.2f} GB ({config.agent.replay_capacity:,} frames), "
-        f"the agent's videos {video_bytes / 1e9:.2f} GB ({config.interactive.agent_videos:,} episodes)"
-    )
     reward_model = build_reward_model(run)
-    demonstrations = None  # the upper bound has none: it learns from true rewards, which videos do not tell
-    if not reward_model.reads_environment_reward:
-        demonstrations = build_demonstrations(run, expert, action_dim)
+    # The upper bound has no demonstrations: it learns from true rewards, which videos do not tell.
+    demonstrated = 0 if reward_model.reads_environment_reward else demonstrated_videos(run, expert)
+    size = pictures.agent_size
+    replay_bytes = ReplayBuffer.bytes_needed(config.agent.replay_capacity, size, action_dim)
+    video_bytes = AgentVideos.bytes_needed(config.interactive.agent_videos, frames, pictures.video_size)
+    parts = [
+        f"replay {replay_bytes / 1e9:.2f} GB ({config.agent.replay_capacity:,} frames)",
+        f"the agent's videos {video_bytes / 1e9:.2f} GB ({config.interactive.agent_videos:,} episodes)",
+    ]
+    if demonstrated:
+        bytes_needed = ReplayBuffer.bytes_needed(demonstrated * len(expert[0].frames), size, action_dim)
+        parts.append(f"demonstrations {bytes_needed / 1e9:.2f} GB ({demonstrated:,} videos)")
+    console.print(f"memory when full: {', '.join(parts)}")
     return Components(
         reward_model=reward_model,
         agent=build_agent(run, environment),
@@ -139,7 +147,7 @@ def build_components(
             config.agent.shift,
         ),
         agent_videos=AgentVideos(config.interactive.agent_videos, frames, pictures.video_size),
-        demonstrations=demonstrations,
+        demonstrations=build_demonstrations(run, expert, action_dim) if demonstrated else None,
     )
 
 
