@@ -62,6 +62,7 @@ def _without_demonstrations(config: TrainingConfig) -> TrainingConfig:
 
 VARIANTS: dict[str, Callable[[TrainingConfig], TrainingConfig]] = {
     "preset": lambda config: config,
+    "cloning alone": lambda config: replace(config, agent=replace(config.agent, cloning_weight=1e6)),
     "without demonstrations": _without_demonstrations,
     "without demonstrations, spoiled_share 0.5": lambda config: _reward(
         _without_demonstrations(config), spoiled_share=0.5
