@@ -36,9 +36,10 @@ from bootifol.types import Episode, FrameBatch, Video
 VARIANTS = {
     "drawn uniformly, whole history": (None, 0.0),
     "moving, whole history": (0.8, 0.0),
-    "moving, history dropped in 80 %": (0.8, 0.8),
-    "moving, history always dropped": (0.8, 1.0),
+    "moving, 80 % without history": (0.8, 0.8),
+    "moving, all without history": (0.8, 1.0),
 }
+"""Share of the transitions in which the picture moves (None: as they come), and of the stacks without history."""
 COLUMNS = ("variant", "seed", "updates", "cloning_loss", "mean_return", "episodes_above_half")
 
 
@@ -68,6 +69,7 @@ def main() -> None:
     parser.add_argument("--updates", type=int, default=4000, help="gradient steps of each variant")
     parser.add_argument("--episodes", type=int, default=20, help="to judge each clone by, 60 steps each")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=list(VARIANTS))
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
@@ -79,7 +81,7 @@ def main() -> None:
     done = {(row["variant"], row["seed"]) for row in rows}
     config = preset(arguments.preset)
     episodes = expert_episodes(arguments.task, config, arguments.videos, arguments.seed)
-    for variant in VARIANTS:
+    for variant in arguments.variants:
         if (variant, str(arguments.seed)) in done:
             continue
         rows.append(cloned(variant, episodes, config, arguments))
