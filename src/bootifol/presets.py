@@ -48,6 +48,7 @@ CPU = TrainingConfig(
         exploration_steps=6000,
         saturation_weight=0.01,
         cloning_weight=10.0,
+        averaging=0.999,
         replay_capacity=40_000,
     ),
     alignment=AlignmentConfig(gradient_steps=500),
@@ -62,7 +63,7 @@ CPU = TrainingConfig(
 """The same algorithm with smaller networks, pictures and counts: about an hour on 2 cores and 8 GB.
 
 Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
-`motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `saturation_weight` and
+`motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `saturation_weight`, `averaging` and
 `cloning_weight` of the agent, and `demonstrations`, by which the policy starts as a clone of the videos; each is
 described at its field.
 """
@@ -96,6 +97,7 @@ DRAWN = replace(
         shift=2,
         saturation_weight=0.1,
         cloning_weight=0.0,
+        averaging=0.0,
     ),
     demonstrations=DemonstrationConfig(),
     alignment=AlignmentConfig(gradient_steps=150, time_share=0.25, log_every=10),

@@ -279,9 +279,30 @@ def test_target_critic_follows_slowly() -> None:
         np.testing.assert_allclose(after[name], expected, rtol=1e-5, atol=1e-7)
 
 
+def test_the_averaged_policy_follows_slowly_and_acts_without_exploration() -> None:
+    agent = make_agent(dataclasses.replace(SMALL, averaging=0.75))
+    newest = make_agent(SMALL)
+    before = agent.state()
+    agent.update(make_batch(), 0)
+    newest.update(make_batch(), 0)
+    after = agent.state()
+    averaged = [name for name in before if name.startswith("averaged_") and "/" not in name]
+    assert len(averaged) == sum(name.startswith(("encoder.", "actor.")) for name in before)
+    for name in averaged:
+        moved = after[name.removeprefix("averaged_")]
+        np.testing.assert_allclose(after[name], 0.75 * before[name] + 0.25 * moved, rtol=1e-5, atol=1e-7)
+    observation = make_batch(9).observation[0].permute(1, 2, 0).contiguous().numpy()
+    same, other = (
+        [one.act(observation, 10**9, explore=explore) for one in (agent, newest)] for explore in (True, False)
+    )
+    np.testing.assert_array_equal(*same)
+    assert not np.array_equal(*other)
+
+
+@pytest.mark.parametrize("averaging", [0.0, 0.9])
 @pytest.mark.parametrize("precision", ["bf16", "fp32"])
-def test_state_is_exact(tmp_path, precision) -> None:
-    config = dataclasses.replace(SMALL, precision=precision)
+def test_state_is_exact(tmp_path, precision, averaging) -> None:
+    config = dataclasses.replace(SMALL, precision=precision, averaging=averaging)
     agent = make_agent(config)
     for i in range(2):
         agent.clone(make_batch(i))
@@ -294,8 +315,9 @@ def test_state_is_exact(tmp_path, precision) -> None:
     assert agent.clone(make_batch(2)) == resumed.clone(make_batch(2))
     for i in range(2, 4):
         assert agent.update(make_batch(i), i) == resumed.update(make_batch(i), i)
-        actions = [one.act(observation, 10, explore=True) for one in (agent, resumed)]
-        np.testing.assert_array_equal(*actions)
+        for explore in (True, False):
+            actions = [one.act(observation, 10, explore=explore) for one in (agent, resumed)]
+            np.testing.assert_array_equal(*actions)
     states = agent.state(), resumed.state()
     assert states[0].keys() == states[1].keys()
     for name, array in states[0].items():

@@ -8,6 +8,7 @@ not, and exploration noise on a linear schedule, which also smooths the targets.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -96,6 +97,10 @@ class DrQv2Config:
     cloning_learning_rate: float = 5e-4
     """Of Adam for encoder and actor in the Cloning Phase, which only `demonstrations` has."""
 
+    averaging: float = 0.0
+    """Beyond DrQ-v2: without exploration the policy acts with running averages of encoder and actor, which keep this
+    share of themselves at each update and so even out the noise of the last ones; 0, as in its paper, the newest."""
+
     precision: Precision = "bf16"
     """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""
 
@@ -126,7 +131,7 @@ class DrQv2Config:
         )
         for names, least in ((at_least_one, 1), (not_negative, 0)):
             require_at_least(least, **{f"agent {name}": getattr(self, name) for name in names})
-        for name in ("discount", "target_rate"):
+        for name in ("discount", "target_rate", "averaging"):
             if not 0 <= getattr(self, name) <= 1:
                 raise BootifolError(f"agent {name} must lie in [0, 1], not {getattr(self, name)}")
         for name in ("learning_rate", "cloning_learning_rate"):
@@ -229,6 +234,9 @@ class DrQv2:
         _to_channels_last(self.encoder)
         self.target_critic.load_state_dict(self.critic.state_dict())
         self.target_critic.requires_grad_(False)
+        self._averaged: tuple[Encoder, Actor] | None = None
+        if config.averaging > 0:
+            self._averaged = copy.deepcopy(self.encoder), copy.deepcopy(self.actor)
         self._generator = torch.Generator(self._device).manual_seed(int(start.initial_seed()) + 1)
         self._critic_optimizer = torch.optim.Adam(
             [*self.encoder.parameters(), *self.critic.parameters()], config.learning_rate, fused=True
@@ -244,14 +252,16 @@ class DrQv2:
         Args:
             observation: uint8 `[S, S, 3 * stack]`.
             agent_steps: where the noise schedule stands.
-            explore: True adds its noise; False returns the mean.
+            explore: True adds its noise; False returns the mean, with averaged parameters where there are any.
 
         Returns:
             float32 `[A]` in [-1, 1].
         """
         with torch.inference_mode():
             picture = torch.from_numpy(observation).to(self._device).permute(2, 0, 1).unsqueeze(0)
-            mean = self.actor(self.encoder(picture.float()))
+            newest = self.encoder, self.actor
+            encoder, actor = newest if explore or self._averaged is None else self._averaged
+            mean = actor(encoder(picture.float()))
             if explore:
                 mean = noisy_action(mean, self.config.exploration(agent_steps), None, self._generator)
             return _to_numpy(mean[0])
@@ -266,6 +276,7 @@ class DrQv2:
             action = self.actor(self.encoder(self._network_input(batch.observation)))
         loss = cloning_loss(action, batch.action.to(self._device))
         self._step(self._cloning_optimizer, loss, "cloning")
+        self._average()
         return {"agent/cloning_loss": float(loss.detach())}
 
     def update(self, batch: Batch, agent_steps: float) -> Metrics:
@@ -320,6 +331,7 @@ class DrQv2:
             torch._foreach_lerp_(
                 list(self.target_critic.parameters()), list(self.critic.parameters()), self.config.target_rate
             )
+        self._average()
         return metrics | {
             "agent/critic_loss": float(loss_of_critic.detach()),
             "agent/actor_loss": float(loss_of_actor.detach()),
@@ -329,6 +341,15 @@ class DrQv2:
             "agent/exploration": stddev,
             "agent/saturated": float((mean_action.detach().abs() > SATURATED).float().mean()),
         }
+
+    def _average(self) -> None:
+        if self._averaged is None:
+            return
+        with torch.no_grad():
+            for average, newest in zip(self._averaged, (self.encoder, self.actor), strict=True):
+                torch._foreach_lerp_(
+                    list(average.parameters()), list(newest.parameters()), 1.0 - self.config.averaging
+                )
 
     def state(self) -> Arrays:
         """Copies of all parameters, of the optimizers and of the noise generator."""
@@ -362,12 +383,14 @@ class DrQv2:
         self._generator.set_state(torch.from_numpy(arrays["generator"].copy()))
 
     def _parameters(self) -> dict[str, Tensor]:
-        networks = {
+        networks: dict[str, nn.Module] = {
             "encoder": self.encoder,
             "actor": self.actor,
             "critic": self.critic,
             "target_critic": self.target_critic,
         }
+        if self._averaged is not None:
+            networks["averaged_encoder"], networks["averaged_actor"] = self._averaged
         return {
             f"{network_name}.{name}": parameter
             for network_name, network in networks.items()
