@@ -145,11 +145,16 @@ def test_pictures_are_not_saved_twice() -> None:
 
 
 def test_cloning_phases_come_when_they_are_due(tmp_path: Path, demos: Path) -> None:
-    """60 steps of warm-up, then one phase, and another each 60 agent steps with half as many gradient steps."""
-    run = new_run(tmp_path / "run", demos, config=WITH_DEMONSTRATIONS)
+    """60 steps of warm-up, then one phase, and another each 60 agent steps with half as many gradient steps: at 120
+    and 180, and none after `repeat_until`."""
+    config = replace(
+        WITH_DEMONSTRATIONS, interactive=replace(WITH_DEMONSTRATIONS.interactive, agent_steps=300)
+    )
+    config = replace(config, demonstrations=replace(config.demonstrations, repeat_until=200))
+    run = new_run(tmp_path / "run", demos, config=config)
     assert run.learn()
     counters = run.counters
-    assert (counters.agent_steps, counters.cloning_phases) == (240, 3)
+    assert (counters.agent_steps, counters.cloning_phases) == (300, 3)
     assert counters.inverse_dynamics_updates == 3 + 2 * 2
     assert counters.cloning_updates == 4 + 2 * 2
     assert run.components.demonstrations is not None

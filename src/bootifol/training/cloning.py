@@ -69,11 +69,15 @@ def cloning_in_progress(demonstrations: Demonstrations, counters: Counters) -> b
     )
 
 
-def cloning_due(demonstrations: Demonstrations, counters: Counters) -> bool:
+def cloning_due(demonstrations: Demonstrations, counters: Counters, budget: Budget) -> bool:
     """Whether a Cloning Phase comes next, once the warm-up is over."""
     if counters.cloning_phases == 0 or cloning_in_progress(demonstrations, counters):
         return True
-    return counters.agent_steps - demonstrations.refreshed_at >= demonstrations.config.repeat_every
+    config = demonstrations.config
+    return (
+        counters.agent_steps - demonstrations.refreshed_at >= config.repeat_every
+        and budget.scheduled_steps(counters) <= config.repeat_until
+    )
 
 
 def cloning_extent(demonstrations: Demonstrations, counters: Counters) -> tuple[int, int]:

@@ -56,6 +56,9 @@ class DemonstrationConfig:
     """Agent steps from one Cloning Phase to the next: the inverse dynamics has newer steps to learn from, and every
     demonstration gets its actions and rewards anew."""
 
+    repeat_until: int = 20_000
+    """Agent steps after which no further Cloning Phase begins, so that the last one is not cut off by the end."""
+
     repeat_share: float = 0.5
     """Gradient steps of each later Cloning Phase, as a share of the first one's."""
 
@@ -70,7 +73,8 @@ class DemonstrationConfig:
                 raise BootifolError(f"demonstrations: {name} must be in [0, 1], not {getattr(self, name)}")
         names = ("videos", "inverse_dynamics_updates", "repeat_every", "batch_size")
         require_at_least(1, **{f"demonstrations.{name}": getattr(self, name) for name in names})
-        require_at_least(0, **{"demonstrations.cloning_updates": self.cloning_updates})
+        not_negative = ("cloning_updates", "repeat_until")
+        require_at_least(0, **{f"demonstrations.{name}": getattr(self, name) for name in not_negative})
 
     def updates_until(self, cloning_phases: int) -> tuple[int, int]:
         """Gradient steps of the inverse dynamics, and of cloning, when so many Cloning Phases have ended."""

@@ -84,7 +84,7 @@ class InteractivePhase:
         """Whether a Cloning Phase comes next: with demonstrations, once the warm-up is over."""
         if self.demonstrations is None or self._warming_up:
             return False
-        return cloning_due(self.demonstrations, self.counters)
+        return cloning_due(self.demonstrations, self.counters, self.budget)
 
     @property
     def _warming_up(self) -> bool:
