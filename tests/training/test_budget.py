@@ -35,6 +35,16 @@ def test_with_a_time_budget_schedules_are_stretched_over_what_alignment_left() -
     assert budget.ended(Counters(agent_steps=7, alignment_seconds=20.0, interactive_seconds=81.0))
 
 
+def test_cloning_takes_its_time_and_moves_no_schedule() -> None:
+    budget = Budget(agent_steps=1000, seconds=100.0)
+    before = Counters(interactive_seconds=0.1)
+    assert budget.scheduled_steps(before) == 1
+    assert budget.scheduled_steps(Counters(interactive_seconds=0.1, cloning_seconds=50.0)) == 2
+    assert budget.scheduled_steps(Counters(interactive_seconds=25.0, cloning_seconds=50.0)) == 500
+    assert budget.ended(Counters(interactive_seconds=0.1, cloning_seconds=100.0))
+    assert Counters(alignment_seconds=1.0, interactive_seconds=2.0, cloning_seconds=4.0).seconds == 7.0
+
+
 def test_progress_counts_steps_or_with_a_time_budget_seconds() -> None:
     counters = Counters(alignment_steps=3, agent_steps=7, alignment_seconds=20.0, interactive_seconds=41.5)
     steps = Budget(agent_steps=1000, alignment_steps=50)

@@ -29,13 +29,15 @@ class Counters:
     """Wall-clock time spent in the Alignment Phase."""
     interactive_seconds: float = 0.0
     """Wall-clock time spent in the Interactive Phase, evaluations included."""
+    cloning_seconds: float = 0.0
+    """Wall-clock time spent in Cloning Phases."""
 
     def as_json(self) -> dict[str, float]:
         return asdict(self)
 
     @property
     def seconds(self) -> float:
-        return self.alignment_seconds + self.interactive_seconds
+        return self.alignment_seconds + self.interactive_seconds + self.cloning_seconds
 
 
 class Stopwatch:
@@ -55,8 +57,9 @@ class Budget:
     """What a run may spend.
 
     Without a time limit, schedules follow agent steps and a run is reproducible bit for bit. With one, they are
-    stretched over the time there is: a quarter of the way into the time, the noise stands where it would stand
-    a quarter of the way into `agent_steps`.
+    stretched over the time there is for acting: a quarter of the way into it, the noise stands where it would stand
+    a quarter of the way into `agent_steps`. Alignment and Cloning Phases take their share of the time first, and move
+    no schedule.
     """
 
     agent_steps: int
@@ -80,7 +83,7 @@ class Budget:
         """Where schedules stand, in agent steps from 0 to N_π."""
         if self.seconds is None:
             return counters.agent_steps
-        available = max(self.seconds - counters.alignment_seconds, 1e-9)
+        available = max(self.seconds - counters.alignment_seconds - counters.cloning_seconds, 1e-9)
         return min(int(self.agent_steps * counters.interactive_seconds / available), self.agent_steps)
 
     def alignment_extent(self, counters: Counters) -> tuple[str, int, int]:
@@ -93,7 +96,8 @@ class Budget:
         """The same of the Interactive Phase: agent steps or seconds."""
         if self.seconds is None:
             return "agent steps", counters.agent_steps, self.agent_steps
-        return "seconds", int(counters.interactive_seconds), round(self.seconds - counters.alignment_seconds)
+        available = self.seconds - counters.alignment_seconds - counters.cloning_seconds
+        return "seconds", int(counters.interactive_seconds), round(available)
 
     def ended(self, counters: Counters) -> bool:
         return self.scheduled_steps(counters) >= self.agent_steps

@@ -36,7 +36,7 @@ def cloning_phase(
         reward_model: rewards the expert videos.
         rng: draws batches and references.
         budget: a run whose time is over ends the phase.
-        counters: `inverse_dynamics_updates`, `cloning_updates` and `interactive_seconds` are kept up to date.
+        counters: `inverse_dynamics_updates`, `cloning_updates` and `cloning_seconds` are kept up to date.
 
     Yields:
         The metrics of each gradient step.
@@ -49,14 +49,15 @@ def cloning_phase(
     while not budget.ended(counters) and counters.inverse_dynamics_updates < inverse_dynamics_updates:
         metrics = demonstrations.learn_inverse_dynamics(agent_replay, rng)
         counters.inverse_dynamics_updates += 1
-        counters.interactive_seconds += watch.lap()
+        counters.cloning_seconds += watch.lap()
         yield metrics
     if demonstrations.refreshes < counters.cloning_phases:
         demonstrations.refresh(counters.agent_steps, reward_model, rng)
+        counters.cloning_seconds += watch.lap()
     while not budget.ended(counters) and counters.cloning_updates < cloning_updates:
         metrics = agent.clone(demonstrations.sample(agent.config.batch_size, rng))
         counters.cloning_updates += 1
-        counters.interactive_seconds += watch.lap()
+        counters.cloning_seconds += watch.lap()
         yield metrics
 
 
