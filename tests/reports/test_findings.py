@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,17 @@ def test_a_good_run_is_told_so(shared_run: Path) -> None:
     told = findings(read_run(shared_run))
     assert [finding.verdict for finding in told] == ["good"] * 4
     assert "its true return rose with it" in told[2].text
+
+
+def test_where_the_policy_was_cloned_the_reward_gets_no_credit(tmp_path: Path) -> None:
+    directory = write_synthetic_run(tmp_path / "cloned")
+    with (directory / "metrics.jsonl").open("a") as file:
+        for step in (10, 20):
+            record = {"phase": "cloning", "gradient_step": step, "seconds": 1.0, "agent/cloning_loss": 0.1}
+            file.write(json.dumps(record) + "\n")
+    following = findings(read_run(directory))[2]
+    assert following.verdict == "fair"
+    assert "clone of the videos" in following.text
 
 
 def test_a_run_that_learned_nothing_is_told_so(tmp_path: Path) -> None:

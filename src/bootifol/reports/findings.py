@@ -12,7 +12,7 @@ from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import RankingScores, ranking_scores
 from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import RankingRow
-from bootifol.reports.run_files import INTERACTIVE, Curve, RunFiles
+from bootifol.reports.run_files import CLONING, INTERACTIVE, Curve, RunFiles
 
 Verdict = Literal["good", "fair", "poor"]
 
@@ -134,6 +134,12 @@ def _following(run: RunFiles) -> Finding | None:
         f"Per step of its episodes the agent earned a learned reward of {number(early)} at first "
         f"and {number(late)} at last"
     )
+    if rises and improves and any(phase == CLONING for phase, _ in run.curves):
+        return Finding(
+            "fair",
+            f"{text}, and its true return rose with it. The policy became a clone of the videos in between, so this does "
+            "not show that the reward leads to the task.",
+        )
     if rises and improves:
         return Finding("good", f"{text}, and its true return rose with it: the reward leads to the task.")
     if rises:
