@@ -137,8 +137,8 @@ def _following(run: RunFiles) -> Finding | None:
     if rises and improves and any(phase == CLONING for phase, _ in run.curves):
         return Finding(
             "fair",
-            f"{text}, and its true return rose with it. The policy became a clone of the videos in between, so this does "
-            "not show that the reward leads to the task.",
+            f"{text}, and its true return rose with it. The policy became a clone of the videos in between, so this "
+            "does not show that the reward leads to the task.",
         )
     if rises and improves:
         return Finding("good", f"{text}, and its true return rose with it: the reward leads to the task.")
