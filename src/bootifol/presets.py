@@ -125,7 +125,7 @@ SMOKE = replace(
     alignment=AlignmentConfig(gradient_steps=60, log_every=5),
     interactive=InteractiveConfig(agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150),
     demonstrations=replace(
-        CPU.demonstrations, videos=50, inverse_dynamics_updates=60, cloning_updates=60, repeat_every=500
+        CPU.demonstrations, videos=20, inverse_dynamics_updates=30, cloning_updates=30, repeat_until=0
     ),
     evaluation=EvaluationConfig(
         every=450, episodes=1, long_episodes=1, final_episodes=2, held_out_videos=6, showcase_episodes=2
