@@ -28,6 +28,7 @@ from bootifol.presets import preset
 from bootifol.progress import progress
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.tasks import make_environment, task_named
+from bootifol.training.cloning import one_cycle
 from bootifol.training.config import TrainingConfig
 from bootifol.training.demonstrations import DemonstrationConfig, Demonstrations
 from bootifol.training.interactive import episode_seed, evaluation_seeds
@@ -133,9 +134,13 @@ def cloned(
     rng = np.random.default_rng(arguments.seed)
     losses = []
     with progress(f"cloning: {variant}", arguments.updates) as advance:
-        for _ in range(arguments.updates):
+        for done in range(arguments.updates):
             draw = replay.sample if moving_share is None else demonstrations.sample
-            losses.append(agent.clone(draw(config.agent.batch_size, rng))["agent/cloning_loss"])
+            learning_rate = demonstrations.config.cloning_learning_rate * one_cycle(
+                done, 0, arguments.updates
+            )
+            batch = draw(config.agent.batch_size, rng)
+            losses.append(agent.clone(batch, learning_rate)["agent/cloning_loss"])
             advance(1, loss=losses[-1])
     environment = make_environment(arguments.task, config.pictures, steps)
     results = evaluate(

@@ -240,7 +240,7 @@ def test_cloning_trains_encoder_and_actor_and_nothing_else() -> None:
     agent = make_agent()
     before = agent.state()
     batch = make_batch()
-    losses = [agent.clone(batch)["agent/cloning_loss"] for _ in range(40)]
+    losses = [agent.clone(batch, 1e-3)["agent/cloning_loss"] for _ in range(40)]
     assert losses[-1] < 0.5 * losses[0]
     after = agent.state()
     for name in before.keys() - {"generator"}:
@@ -305,14 +305,14 @@ def test_state_is_exact(tmp_path, precision, averaging) -> None:
     config = dataclasses.replace(SMALL, precision=precision, averaging=averaging)
     agent = make_agent(config)
     for i in range(2):
-        agent.clone(make_batch(i))
+        agent.clone(make_batch(i), 1e-3)
         agent.update(make_batch(i), i)
     write_arrays(tmp_path / "agent.safetensors", agent.state())
     resumed = make_agent(config, seed=7)
     resumed.update(make_batch(5), 5)
     resumed.load_state(read_arrays(tmp_path / "agent.safetensors", "the agent"))
     observation = make_batch(9).observation[0].permute(1, 2, 0).contiguous().numpy()
-    assert agent.clone(make_batch(2)) == resumed.clone(make_batch(2))
+    assert agent.clone(make_batch(2), 1e-3) == resumed.clone(make_batch(2), 1e-3)
     for i in range(2, 4):
         assert agent.update(make_batch(i), i) == resumed.update(make_batch(i), i)
         for explore in (True, False):

@@ -13,6 +13,7 @@ from tiny_runs import WITH_DEMONSTRATIONS, new_run
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.errors import BootifolError
 from bootifol.replay.buffer import ReplayBuffer
+from bootifol.training.cloning import one_cycle
 from bootifol.training.demonstrations import DemonstrationConfig, Demonstrations
 from bootifol.types import Arrays, Episode, FrameBatch, Frames, Metrics, Video, VideoSource
 
@@ -76,7 +77,7 @@ class CountingReward:
 
 def make_demonstrations(config: DemonstrationConfig, count: int = 6) -> Demonstrations:
     replay = ReplayBuffer(count * (STEPS + 1), SIZE, 1, stack=2, n_step=1, shift=0)
-    inverse_dynamics = InverseDynamics("strided", SIZE, 2, 1, 1, seed=1, learning_rate=2e-3, hidden_dim=64)
+    inverse_dynamics = InverseDynamics("strided", SIZE, 2, 1, 1, seed=1, hidden_dim=64)
     return Demonstrations(config, Videos(count), replay, inverse_dynamics, SIZE, 1)
 
 
@@ -94,7 +95,7 @@ def agent_steps() -> ReplayBuffer:
 def test_actions_and_rewards_of_the_videos_are_inferred() -> None:
     demonstrations, replay, rng = make_demonstrations(CONFIG), agent_steps(), np.random.default_rng(0)
     for _ in range(100):
-        demonstrations.learn_inverse_dynamics(replay, rng)
+        demonstrations.learn_inverse_dynamics(replay, rng, 2e-3)
     demonstrations.refresh(0, CountingReward(), rng)
     everything = demonstrations.replay.sample(6 * STEPS, rng, transitions=np.arange(6 * STEPS))
     shown = everything.action.numpy().reshape(6, STEPS)
@@ -159,6 +160,18 @@ def test_cloning_phases_come_when_they_are_due(tmp_path: Path, demos: Path) -> N
     assert counters.cloning_updates == 4 + 2 * 2
     assert run.components.demonstrations is not None
     assert run.components.demonstrations.refreshed_at == 180
+
+
+def test_a_learning_rate_rises_and_falls_in_every_phase() -> None:
+    shares = [one_cycle(done, 100, 200) for done in range(100, 200)]
+    highest = int(np.argmax(shares))
+    assert 3 <= highest <= 6
+    assert shares[highest] > 0.99
+    assert shares[0] < 0.25
+    assert 0 < shares[-1] < 0.001
+    assert (np.diff(shares[: highest + 1]) > 0).all()
+    assert (np.diff(shares[highest:]) < 0).all()
+    assert 0 < one_cycle(7, 7, 8) <= 1  # a phase of a single step
 
 
 def test_warm_up_actions_are_held(tmp_path: Path, demos: Path) -> None:

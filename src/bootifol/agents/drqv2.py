@@ -94,9 +94,6 @@ class DrQv2Config:
     """Beyond the paper: how strongly actor and encoder are pulled to the inferred actions of expert videos, relative
     to the mean of |Q| or 1, whichever is larger; 0, as in the paper, not at all. Needs `demonstrations`."""
 
-    cloning_learning_rate: float = 5e-4
-    """Of Adam for encoder and actor in the Cloning Phase, which only `demonstrations` has."""
-
     averaging: float = 0.0
     """Beyond DrQ-v2: without exploration the policy acts with running averages of encoder and actor, which keep this
     share of themselves at each update and so even out the noise of the last ones; 0, as in its paper, the newest."""
@@ -131,12 +128,13 @@ class DrQv2Config:
         )
         for names, least in ((at_least_one, 1), (not_negative, 0)):
             require_at_least(least, **{f"agent {name}": getattr(self, name) for name in names})
-        for name in ("discount", "target_rate", "averaging"):
+        for name in ("discount", "target_rate"):
             if not 0 <= getattr(self, name) <= 1:
                 raise BootifolError(f"agent {name} must lie in [0, 1], not {getattr(self, name)}")
-        for name in ("learning_rate", "cloning_learning_rate"):
-            if not getattr(self, name) > 0:
-                raise BootifolError(f"agent {name} must be positive, not {getattr(self, name)}")
+        if not 0 <= self.averaging < 1:
+            raise BootifolError(f"agent averaging must lie in [0, 1), not {self.averaging}")
+        if not self.learning_rate > 0:
+            raise BootifolError(f"agent learning_rate must be positive, not {self.learning_rate}")
 
     def exploration(self, agent_steps: float) -> float:
         """Standard deviation of the noise after so many agent steps."""
@@ -243,7 +241,7 @@ class DrQv2:
         )
         self._actor_optimizer = torch.optim.Adam(self.actor.parameters(), config.learning_rate, fused=True)
         self._cloning_optimizer = torch.optim.Adam(
-            [*self.encoder.parameters(), *self.actor.parameters()], config.cloning_learning_rate, fused=True
+            [*self.encoder.parameters(), *self.actor.parameters()], config.learning_rate, fused=True
         )
 
     def act(self, observation: Observation, agent_steps: float, explore: bool) -> Action:
@@ -266,8 +264,12 @@ class DrQv2:
                 mean = noisy_action(mean, self.config.exploration(agent_steps), None, self._generator)
             return _to_numpy(mean[0])
 
-    def clone(self, batch: Batch) -> Metrics:
+    def clone(self, batch: Batch, learning_rate: float) -> Metrics:
         """One gradient step of encoder and actor towards the actions of a batch; its rewards are not looked at.
+
+        Args:
+            batch: observations and demonstrated actions.
+            learning_rate: of Adam, for this step.
 
         Raises:
             BootifolError: the loss is NaN or infinite; the parameters are as before.
@@ -275,6 +277,7 @@ class DrQv2:
         with self._autocast():
             action = self.actor(self.encoder(self._network_input(batch.observation)))
         loss = cloning_loss(action, batch.action.to(self._device))
+        self._cloning_optimizer.param_groups[0]["lr"] = learning_rate
         self._step(self._cloning_optimizer, loss, "cloning")
         self._average()
         return {"agent/cloning_loss": float(loss.detach())}

@@ -26,7 +26,6 @@ class InverseDynamics:
         n_step: how far apart the two stacks are; at the end of an episode they are closer, in training and in use.
         action_dim: action dimensions.
         seed: of the initial parameters.
-        learning_rate: of Adam.
         hidden_dim: width of the two hidden layers.
     """
 
@@ -38,7 +37,6 @@ class InverseDynamics:
         n_step: int,
         action_dim: int,
         seed: int,
-        learning_rate: float = 5e-4,
         hidden_dim: int = 512,
     ) -> None:
         self.stack, self.n_step = stack, n_step
@@ -56,10 +54,14 @@ class InverseDynamics:
                 nn.Linear(hidden_dim, action_dim),
             )
         convolutions.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-        self._optimizer = torch.optim.Adam(self.network.parameters(), learning_rate, fused=True)
+        self._optimizer = torch.optim.Adam(self.network.parameters(), fused=True)
 
-    def update(self, batch: Batch) -> Metrics:
+    def update(self, batch: Batch, learning_rate: float) -> Metrics:
         """One gradient step on the agent's own transitions, whose two observations were shifted alike.
+
+        Args:
+            batch: the transitions.
+            learning_rate: of Adam, for this step.
 
         Returns:
             The mean squared error of the actions.
@@ -70,6 +72,7 @@ class InverseDynamics:
                 f"the loss of the inverse dynamics is {float(loss.detach())}; the step was not taken: resume from the "
                 "last checkpoint"
             )
+        self._optimizer.param_groups[0]["lr"] = learning_rate
         self._optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         self._optimizer.step()

@@ -6,6 +6,7 @@ are what the inverse dynamics learns from, and again whenever there are enough n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -45,9 +46,14 @@ def cloning_phase(
     config = demonstrations.config
     if not cloning_in_progress(demonstrations, counters):
         counters.cloning_phases += 1
+    inverse_dynamics_before, cloning_before = config.updates_until(counters.cloning_phases - 1)
     inverse_dynamics_updates, cloning_updates = config.updates_until(counters.cloning_phases)
     while not budget.ended(counters) and counters.inverse_dynamics_updates < inverse_dynamics_updates:
-        metrics = demonstrations.learn_inverse_dynamics(agent_replay, rng)
+        share = one_cycle(
+            counters.inverse_dynamics_updates, inverse_dynamics_before, inverse_dynamics_updates
+        )
+        learning_rate = share * config.inverse_dynamics_learning_rate
+        metrics = demonstrations.learn_inverse_dynamics(agent_replay, rng, learning_rate)
         counters.inverse_dynamics_updates += 1
         counters.cloning_seconds += watch.lap()
         yield metrics
@@ -55,10 +61,24 @@ def cloning_phase(
         demonstrations.refresh(counters.agent_steps, reward_model, rng)
         counters.cloning_seconds += watch.lap()
     while not budget.ended(counters) and counters.cloning_updates < cloning_updates:
-        metrics = agent.clone(demonstrations.sample(agent.config.batch_size, rng))
+        share = one_cycle(counters.cloning_updates, cloning_before, cloning_updates)
+        batch = demonstrations.sample(agent.config.batch_size, rng)
+        metrics = agent.clone(batch, share * config.cloning_learning_rate)
         counters.cloning_updates += 1
         counters.cloning_seconds += watch.lap()
         yield metrics
+
+
+def one_cycle(done: int, first: int, end: int) -> float:
+    """What share of its highest value a learning rate has at gradient step `done` of those from `first` to `end`.
+
+    It rises for a twentieth of them and falls to 0 with half a cosine, so that the parameters come to rest.
+    """
+    passed = (done - first + 1) / (end - first + 1)
+    rise = 0.05
+    if passed < rise:
+        return passed / rise
+    return 0.5 + 0.5 * math.cos(math.pi * (passed - rise) / (1 - rise))
 
 
 def cloning_in_progress(demonstrations: Demonstrations, counters: Counters) -> bool:

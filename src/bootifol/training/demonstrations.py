@@ -49,8 +49,14 @@ class DemonstrationConfig:
     inverse_dynamics_updates: int = 1500
     """Gradient steps of the inverse dynamics in the first Cloning Phase, when the agent's warm-up ends."""
 
+    inverse_dynamics_learning_rate: float = 5e-4
+    """Of Adam at its highest: in each phase it rises for a twentieth of the gradient steps and falls to 0."""
+
     cloning_updates: int = 4000
     """Gradient steps of encoder and actor towards the inferred actions in the first Cloning Phase."""
+
+    cloning_learning_rate: float = 1e-3
+    """Of Adam at its highest, rising and falling likewise."""
 
     repeat_every: int = 6000
     """Agent steps from one Cloning Phase to the next: the inverse dynamics has newer steps to learn from, and every
@@ -73,6 +79,9 @@ class DemonstrationConfig:
                 raise BootifolError(f"demonstrations: {name} must be in [0, 1], not {getattr(self, name)}")
         names = ("videos", "inverse_dynamics_updates", "repeat_every", "batch_size")
         require_at_least(1, **{f"demonstrations.{name}": getattr(self, name) for name in names})
+        for name in ("inverse_dynamics_learning_rate", "cloning_learning_rate"):
+            if not getattr(self, name) > 0:
+                raise BootifolError(f"demonstrations: {name} must be positive, not {getattr(self, name)}")
         not_negative = ("cloning_updates", "repeat_until")
         require_at_least(0, **{f"demonstrations.{name}": getattr(self, name) for name in not_negative})
 
@@ -126,9 +135,12 @@ class Demonstrations:
         self._moving = np.flatnonzero(np.concatenate(moving))
         self._still = np.flatnonzero(~np.concatenate(moving))
 
-    def learn_inverse_dynamics(self, agent_replay: ReplayBuffer, rng: np.random.Generator) -> Metrics:
+    def learn_inverse_dynamics(
+        self, agent_replay: ReplayBuffer, rng: np.random.Generator, learning_rate: float
+    ) -> Metrics:
         """One gradient step of the inverse dynamics on the agent's own steps."""
-        return self.inverse_dynamics.update(agent_replay.sample(self.config.batch_size, rng, same_shift=True))
+        batch = agent_replay.sample(self.config.batch_size, rng, same_shift=True)
+        return self.inverse_dynamics.update(batch, learning_rate)
 
     def refresh(self, agent_steps: int, reward_model: RewardModel, rng: np.random.Generator) -> None:
         """Names actions and rewards of every video, as inverse dynamics and reward model now see them."""
