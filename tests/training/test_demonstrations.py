@@ -92,11 +92,16 @@ def agent_steps() -> ReplayBuffer:
     return replay
 
 
+def infer_all(demonstrations: Demonstrations, rng: np.random.Generator) -> None:
+    for index in range(len(demonstrations)):
+        demonstrations.infer(index, CountingReward(), rng)
+
+
 def test_actions_and_rewards_of_the_videos_are_inferred() -> None:
     demonstrations, replay, rng = make_demonstrations(CONFIG), agent_steps(), np.random.default_rng(0)
     for _ in range(100):
         demonstrations.learn_inverse_dynamics(replay, rng, 2e-3)
-    demonstrations.refresh(0, CountingReward(), rng)
+    infer_all(demonstrations, rng)
     everything = demonstrations.replay.sample(6 * STEPS, rng, transitions=np.arange(6 * STEPS))
     shown = everything.action.numpy().reshape(6, STEPS)
     assert np.abs(shown[:, :MOVES] - 1).mean() < 0.3
@@ -123,7 +128,7 @@ def test_videos_without_movement_can_be_drawn_from() -> None:
 
 def test_a_mixed_batch_says_which_rows_are_demonstrated() -> None:
     demonstrations, rng = make_demonstrations(replace(CONFIG, share=0.25)), np.random.default_rng(0)
-    demonstrations.refresh(0, CountingReward(), rng)
+    infer_all(demonstrations, rng)
     batch = demonstrations.mixed(agent_steps(), 16, rng)
     assert batch.demonstrated is not None
     assert batch.demonstrated.tolist() == [False] * 12 + [True] * 4
@@ -133,12 +138,11 @@ def test_a_mixed_batch_says_which_rows_are_demonstrated() -> None:
 def test_pictures_are_not_saved_twice() -> None:
     """They are the demo set's; a checkpoint holds what was inferred."""
     demonstrations, rng = make_demonstrations(CONFIG), np.random.default_rng(0)
-    demonstrations.refresh(7, CountingReward(), rng)
+    infer_all(demonstrations, rng)
     state = demonstrations.state()
     assert not any("frames" in name for name in state)
     restored = make_demonstrations(CONFIG)
     restored.load_state({name: array.copy() for name, array in state.items()})
-    assert (restored.refreshes, restored.refreshed_at) == (1, 7)
     one, other = (d.sample(16, np.random.default_rng(3)) for d in (demonstrations, restored))
     np.testing.assert_array_equal(one.action, other.action)
     np.testing.assert_array_equal(one.reward, other.reward)
@@ -158,8 +162,8 @@ def test_cloning_phases_come_when_they_are_due(tmp_path: Path, demos: Path) -> N
     assert (counters.agent_steps, counters.cloning_phases) == (300, 3)
     assert counters.inverse_dynamics_updates == 3 + 2 * 2
     assert counters.cloning_updates == 4 + 2 * 2
-    assert run.components.demonstrations is not None
-    assert run.components.demonstrations.refreshed_at == 180
+    assert counters.cloning_began_at == 180
+    assert counters.inferred_videos == 3 * 4
 
 
 def test_a_learning_rate_rises_and_falls_in_every_phase() -> None:

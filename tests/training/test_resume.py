@@ -57,10 +57,15 @@ def test_a_run_stopped_while_cloning_goes_on_where_it_was(
         assert not first.learn()
     assert (first.counters.inverse_dynamics_updates, first.counters.cloning_updates) == (2, 0)
     with monkeypatch.context() as patch:
-        interrupt_at_call(patch, DrQv2, "clone", call=3)
+        interrupt_at_call(patch, Demonstrations, "infer", call=2)
         second = resumed(tmp_path / "parts")
         assert not second.learn()
-    assert (second.counters.inverse_dynamics_updates, second.counters.cloning_updates) == (3, 3)
+    assert (second.counters.inverse_dynamics_updates, second.counters.inferred_videos) == (3, 2)
+    with monkeypatch.context() as patch:
+        interrupt_at_call(patch, DrQv2, "clone", call=3)
+        third = resumed(tmp_path / "parts")
+        assert not third.learn()
+    assert (third.counters.inferred_videos, third.counters.cloning_updates) == (4, 3)
     rest = resumed(tmp_path / "parts")
     assert rest.learn()
     assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")

@@ -21,8 +21,12 @@ class Counters:
     evaluations: int = 0
     cloning_phases: int = 0
     """Begun so far."""
+    cloning_began_at: int = 0
+    """Agent steps when the last Cloning Phase began."""
     inverse_dynamics_updates: int = 0
     """In all Cloning Phases."""
+    inferred_videos: int = 0
+    """Expert videos whose actions and rewards were inferred, in all Cloning Phases."""
     cloning_updates: int = 0
     """In all Cloning Phases."""
     alignment_seconds: float = 0.0

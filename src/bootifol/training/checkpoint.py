@@ -2,7 +2,7 @@
 
 ```
 checkpoints/
-  000000000000-000000400/    agent steps, and gradient steps of the other phases: names sort by age
+  000000000000-000000400/    agent steps, and steps of the other phases: names sort by age
     checkpoint.json          counters, random state, how long metrics.jsonl was
     reward_model.safetensors    networks, optimizer, statistics, random state
     agent.safetensors
@@ -58,7 +58,14 @@ def save_checkpoint(directory: Path, progress: Progress, components: Mapping[str
         BootifolError: it could not be written; earlier checkpoints are intact.
     """
     counters = progress.counters
-    other_steps = counters.alignment_steps + counters.inverse_dynamics_updates + counters.cloning_updates
+    other_steps = sum(
+        (
+            counters.alignment_steps,
+            counters.inverse_dynamics_updates,
+            counters.inferred_videos,
+            counters.cloning_updates,
+        )
+    )
     target = directory / f"{counters.agent_steps:012d}-{other_steps:09d}"
     with written_aside(target) as aside:
         aside.mkdir()

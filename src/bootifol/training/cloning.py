@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,14 @@ from bootifol.training.demonstrations import Demonstrations
 from bootifol.types import Metrics
 
 
+class CloningSteps(NamedTuple):
+    """Steps of a Cloning Phase, in this order."""
+
+    inverse_dynamics_updates: int
+    inferred_videos: int
+    cloning_updates: int
+
+
 def cloning_phase(
     agent: DrQv2,
     demonstrations: Demonstrations,
@@ -28,7 +37,7 @@ def cloning_phase(
     budget: Budget,
     counters: Counters,
 ) -> Iterator[Metrics]:
-    """Learns the inverse dynamics, names the videos' actions and rewards, and clones them.
+    """Learns the inverse dynamics, infers the videos' actions and rewards, and clones them.
 
     Args:
         agent: its encoder and actor are trained.
@@ -37,34 +46,36 @@ def cloning_phase(
         reward_model: rewards the expert videos.
         rng: draws batches and references.
         budget: a run whose time is over ends the phase.
-        counters: `inverse_dynamics_updates`, `cloning_updates` and `cloning_seconds` are kept up to date.
+        counters: those of Cloning Phases are kept up to date.
 
     Yields:
-        The metrics of each gradient step.
+        The metrics of each step; a video whose actions and rewards were inferred has none.
     """
     watch = Stopwatch()
     config = demonstrations.config
     if not cloning_in_progress(demonstrations, counters):
         counters.cloning_phases += 1
-    inverse_dynamics_before, cloning_before = config.updates_until(counters.cloning_phases - 1)
-    inverse_dynamics_updates, cloning_updates = config.updates_until(counters.cloning_phases)
-    while not budget.ended(counters) and counters.inverse_dynamics_updates < inverse_dynamics_updates:
-        share = one_cycle(
-            counters.inverse_dynamics_updates, inverse_dynamics_before, inverse_dynamics_updates
-        )
-        learning_rate = share * config.inverse_dynamics_learning_rate
-        metrics = demonstrations.learn_inverse_dynamics(agent_replay, rng, learning_rate)
-        counters.inverse_dynamics_updates += 1
-        counters.cloning_seconds += watch.lap()
-        yield metrics
-    if demonstrations.refreshes < counters.cloning_phases:
-        demonstrations.refresh(counters.agent_steps, reward_model, rng)
-        counters.cloning_seconds += watch.lap()
-    while not budget.ended(counters) and counters.cloning_updates < cloning_updates:
-        share = one_cycle(counters.cloning_updates, cloning_before, cloning_updates)
-        batch = demonstrations.sample(agent.config.batch_size, rng)
-        metrics = agent.clone(batch, share * config.cloning_learning_rate)
-        counters.cloning_updates += 1
+        counters.cloning_began_at = counters.agent_steps
+    first = _steps_until(demonstrations, counters.cloning_phases - 1)
+    end = _steps_until(demonstrations, counters.cloning_phases)
+    while not budget.ended(counters) and (done := _steps_done(counters)) != end:
+        metrics: Metrics = {}
+        if done.inverse_dynamics_updates < end.inverse_dynamics_updates:
+            rate = one_cycle(
+                done.inverse_dynamics_updates, first.inverse_dynamics_updates, end.inverse_dynamics_updates
+            )
+            metrics = demonstrations.learn_inverse_dynamics(
+                agent_replay, rng, rate * config.inverse_dynamics_learning_rate
+            )
+            counters.inverse_dynamics_updates += 1
+        elif done.inferred_videos < end.inferred_videos:
+            demonstrations.infer(done.inferred_videos - first.inferred_videos, reward_model, rng)
+            counters.inferred_videos += 1
+        else:
+            rate = one_cycle(done.cloning_updates, first.cloning_updates, end.cloning_updates)
+            batch = demonstrations.sample(agent.config.batch_size, rng)
+            metrics = agent.clone(batch, rate * config.cloning_learning_rate)
+            counters.cloning_updates += 1
         counters.cloning_seconds += watch.lap()
         yield metrics
 
@@ -83,11 +94,7 @@ def one_cycle(done: int, first: int, end: int) -> float:
 
 def cloning_in_progress(demonstrations: Demonstrations, counters: Counters) -> bool:
     """Whether a Cloning Phase was begun and has not ended."""
-    done = counters.inverse_dynamics_updates, counters.cloning_updates
-    return (
-        done != demonstrations.config.updates_until(counters.cloning_phases)
-        or demonstrations.refreshes < counters.cloning_phases
-    )
+    return _steps_done(counters) != _steps_until(demonstrations, counters.cloning_phases)
 
 
 def cloning_due(demonstrations: Demonstrations, counters: Counters, budget: Budget) -> bool:
@@ -96,13 +103,31 @@ def cloning_due(demonstrations: Demonstrations, counters: Counters, budget: Budg
         return True
     config = demonstrations.config
     return (
-        counters.agent_steps - demonstrations.refreshed_at >= config.repeat_every
+        counters.agent_steps - counters.cloning_began_at >= config.repeat_every
         and budget.scheduled_steps(counters) <= config.repeat_until
     )
 
 
 def cloning_extent(demonstrations: Demonstrations, counters: Counters) -> tuple[int, int]:
-    """Gradient steps of the phase that is due: how many are done, and how many there are."""
+    """Steps of the phase that is due: how many are done, and how many there are."""
     phases = counters.cloning_phases + (not cloning_in_progress(demonstrations, counters))
-    before, until = (sum(demonstrations.config.updates_until(count)) for count in (phases - 1, phases))
-    return counters.inverse_dynamics_updates + counters.cloning_updates - before, until - before
+    before, until = (sum(_steps_until(demonstrations, count)) for count in (phases - 1, phases))
+    return sum(_steps_done(counters)) - before, until - before
+
+
+def _steps_done(counters: Counters) -> CloningSteps:
+    return CloningSteps(counters.inverse_dynamics_updates, counters.inferred_videos, counters.cloning_updates)
+
+
+def _steps_until(demonstrations: Demonstrations, cloning_phases: int) -> CloningSteps:
+    """Steps when so many phases have ended; those after the first have fewer gradient steps."""
+    config, later = demonstrations.config, max(cloning_phases - 1, 0)
+
+    def gradient_steps(of_first: int) -> int:
+        return of_first * min(cloning_phases, 1) + later * round(config.repeat_share * of_first)
+
+    return CloningSteps(
+        gradient_steps(config.inverse_dynamics_updates),
+        cloning_phases * len(demonstrations),
+        gradient_steps(config.cloning_updates),
+    )

@@ -85,15 +85,6 @@ class DemonstrationConfig:
         not_negative = ("cloning_updates", "repeat_until")
         require_at_least(0, **{f"demonstrations.{name}": getattr(self, name) for name in not_negative})
 
-    def updates_until(self, cloning_phases: int) -> tuple[int, int]:
-        """Gradient steps of the inverse dynamics, and of cloning, when so many Cloning Phases have ended."""
-        counts = self.inverse_dynamics_updates, self.cloning_updates
-        later = max(cloning_phases - 1, 0)
-        first, second = (
-            count * min(cloning_phases, 1) + later * round(self.repeat_share * count) for count in counts
-        )
-        return first, second
-
 
 class Demonstrations:
     """Expert videos with inferred actions, as a second replay beside the agent's.
@@ -120,13 +111,8 @@ class Demonstrations:
         self.replay = replay
         self.inverse_dynamics = inverse_dynamics
         self.frame_size = frame_size
-        self.count = min(config.videos, len(expert))
-        self.refreshes = 0
-        """How often actions and rewards have been inferred."""
-        self.refreshed_at = 0
-        """Agent steps when they last were."""
         moving = []
-        for index in range(self.count):
+        for index in range(min(config.videos, len(expert))):
             frames = self._at_agent_size(expert[index])
             steps = len(frames) - 1
             nothing = np.zeros((steps, action_dim), np.float32)
@@ -135,6 +121,10 @@ class Demonstrations:
         self._moving = np.flatnonzero(np.concatenate(moving))
         self._still = np.flatnonzero(~np.concatenate(moving))
 
+    def __len__(self) -> int:
+        """Expert videos used."""
+        return len(self.replay.episode_ids)
+
     def learn_inverse_dynamics(
         self, agent_replay: ReplayBuffer, rng: np.random.Generator, learning_rate: float
     ) -> Metrics:
@@ -142,15 +132,12 @@ class Demonstrations:
         batch = agent_replay.sample(self.config.batch_size, rng, same_shift=True)
         return self.inverse_dynamics.update(batch, learning_rate)
 
-    def refresh(self, agent_steps: int, reward_model: RewardModel, rng: np.random.Generator) -> None:
-        """Names actions and rewards of every video, as inverse dynamics and reward model now see them."""
-        for episode_id, index in zip(self.replay.episode_ids, range(self.count), strict=True):
-            video = self.expert[index]
-            rewards = reward_model.label(video, draw_references(reward_model, self.expert, rng))
-            actions = self.inverse_dynamics.actions(self._at_agent_size(video))
-            self.replay.relabel(episode_id, rewards, actions)
-        self.refreshes += 1
-        self.refreshed_at = agent_steps
+    def infer(self, index: int, reward_model: RewardModel, rng: np.random.Generator) -> None:
+        """Gives a video the actions and rewards that inverse dynamics and reward model now see in it."""
+        video = self.expert[index]
+        rewards = reward_model.label(video, draw_references(reward_model, self.expert, rng))
+        actions = self.inverse_dynamics.actions(self._at_agent_size(video))
+        self.replay.relabel(self.replay.episode_ids[index], rewards, actions)
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
         """Transitions of the expert videos, most of them where the picture moves."""
@@ -176,14 +163,13 @@ class Demonstrations:
         return replace(Batch(**joined), demonstrated=rows)
 
     def state(self) -> Arrays:
-        """The inverse dynamics, the inferred actions and rewards, how often and when they were."""
+        """The inverse dynamics, the inferred actions and rewards."""
         arrays = {f"inverse_dynamics/{name}": array for name, array in self.inverse_dynamics.state().items()}
         stored = self.replay.state()
         return {
             **arrays,
             "actions": stored["actions"],
             "rewards": stored["rewards"],
-            "refreshes_and_refreshed_at": np.array([self.refreshes, self.refreshed_at], np.int64),
         }
 
     def load_state(self, arrays: Arrays) -> None:
@@ -195,7 +181,6 @@ class Demonstrations:
         self.replay.load_state(
             {**self.replay.state(), "actions": arrays["actions"], "rewards": arrays["rewards"]}
         )
-        self.refreshes, self.refreshed_at = (int(value) for value in arrays["refreshes_and_refreshed_at"])
 
     def _at_agent_size(self, video: Video) -> Frames:
         if video.frames.shape[1] == self.frame_size:

@@ -105,8 +105,8 @@ class InteractivePhase:
     def _update_agent(self) -> None:
         if self._warming_up or self.counters.agent_steps % self.agent.config.update_every:
             return
-        if self.demonstrations is not None and not self.demonstrations.refreshes:
-            return
+        if self.demonstrations is not None and not self.counters.cloning_phases:
+            return  # the warm-up has ended in this episode, and cloning comes first
         batch = self._batch(self.agent.config.batch_size)
         self.averages.add(self.agent.update(batch, self.budget.scheduled_steps(self.counters)))
         self.counters.agent_updates += 1

@@ -157,14 +157,14 @@ class Run:
             self.budget,
             self.counters,
         )
-        with progress("cloning the videos (gradient steps)", total, done) as advance:
+        with progress("cloning the videos (steps)", total, done) as advance:
             for metrics in phase:
                 averages.add(metrics)
                 done += 1
                 advance(1, **metrics)
-                if done % log_every == 0 or done == total:
+                if (done % log_every == 0 or done == total) and (means := averages.pop()):
                     gradient_steps = self.counters.inverse_dynamics_updates + self.counters.cloning_updates
-                    self._log("cloning", "gradient_step", gradient_steps, averages.pop())
+                    self._log("cloning", "gradient_step", gradient_steps, means)
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()
