@@ -41,6 +41,8 @@ CONVOLUTIONS = {
     "coarse": ((32, 8, 4), (64, 4, 2), (64, 3, 1)),
 }
 
+STAGES = ["environment", "update", "alignment", "label"]
+
 Work = Callable[[], object]
 
 
@@ -153,6 +155,7 @@ def main() -> None:
         "--runs", type=int, default=3, help="timed runs of the slow stages; quick ones get more"
     )
     parser.add_argument("--sizes", nargs="+", choices=["paper", "cpu"], default=["paper", "cpu"])
+    parser.add_argument("--stages", nargs="+", choices=STAGES, default=STAGES, help="what to time")
     arguments = parser.parse_args()
     keep_freed_memory()
     torch.set_num_threads(arguments.threads)
@@ -160,22 +163,27 @@ def main() -> None:
         "sizes", "stage", "ours ms", "plain ms", "plain / ours", title=f"{arguments.threads} thread(s)"
     )
     presets = {"paper": PAPER, "cpu": CPU}
-    with progress("timing", total=4 * len(arguments.sizes)) as advance:
+    with progress("timing", total=len(arguments.stages) * len(arguments.sizes)) as advance:
         for name in arguments.sizes:
             config = presets[name]
             # bf16 is ours to use at the paper's sizes too; the plain version is fp32 by definition.
             reward = replace(config.reward.bootifol, precision="bf16")
-            stages: list[tuple[str, Callable[[], tuple[Work, Work]], int]] = [
-                (
+            stages: dict[str, tuple[str, Callable[[], tuple[Work, Work]], int]] = {
+                "environment": (
                     "agent step of the environment (plain: full quality)",
                     partial(environment_step, config),
                     50,
                 ),
-                ("sample and RL update", partial(agent_update, config), arguments.runs + 2),
-                ("alignment step", partial(alignment_step, config, reward), arguments.runs),
-                ("label an episode of 61 frames", partial(label_episode, config, reward), arguments.runs + 2),
-            ]
-            for stage, make, runs in stages:
+                "update": ("sample and RL update", partial(agent_update, config), arguments.runs + 2),
+                "alignment": ("alignment step", partial(alignment_step, config, reward), arguments.runs),
+                "label": (
+                    "label an episode of 61 frames",
+                    partial(label_episode, config, reward),
+                    arguments.runs + 2,
+                ),
+            }
+            for key in arguments.stages:
+                stage, make, runs = stages[key]
                 ours, plain = medians(*make(), runs, warm_up=1)
                 table.add_row(name, stage, f"{ours:.1f}", f"{plain:.1f}", f"{plain / ours:.1f}")
                 advance(1)

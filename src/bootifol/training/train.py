@@ -25,7 +25,7 @@ from bootifol.progress import progress
 from bootifol.tasks import task_named
 from bootifol.tracking import Averages, Tracker
 from bootifol.training.alignment import alignment_phase
-from bootifol.training.budget import Budget, Counters
+from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.checkpoint import (
     Progress,
     load_checkpoint,
@@ -169,7 +169,9 @@ class Run:
                     return self._stop()
                 self._checkpoint_if_due()
         if self.counters.cloning_phases == 1:
+            watch = Stopwatch()
             self._evaluate_while_training()
+            self.counters.cloning_seconds += watch.lap()
             self._checkpoint()
         return True
 
