@@ -57,7 +57,7 @@ CPU = TrainingConfig(
         reward_updates_until=15_000,
         agent_videos=500,
     ),
-    demonstrations=DemonstrationConfig(share=0.25, cloning_updates=12_000),
+    demonstrations=DemonstrationConfig(share=0.25, cloning_updates=6000),
     evaluation=EvaluationConfig(every=2500, long_episodes=5, final_episodes=50),
 )
 """The same algorithm with smaller networks, pictures and counts: meant for about an hour on 2 cores and 8 GB.
@@ -73,7 +73,9 @@ DEMO = replace(
     agent=replace(CPU.agent, replay_capacity=20_000),
     alignment=AlignmentConfig(gradient_steps=500, time_share=0.25),
     interactive=replace(CPU.interactive, agent_videos=300),
-    demonstrations=replace(CPU.demonstrations, cloning_updates=5000),
+    demonstrations=replace(
+        CPU.demonstrations, inverse_dynamics_updates=1000, cloning_updates=2500, repeat_until=8000
+    ),
     evaluation=EvaluationConfig(every=2500, long_episodes=1, final_episodes=10),
     checkpoint_minutes=5.0,
 )

@@ -52,7 +52,14 @@ WITH_DEMONSTRATIONS = replace(
     TINY,
     agent=replace(TINY.agent, warm_up_hold=4, cloning_weight=1.0),
     demonstrations=DemonstrationConfig(
-        share=0.5, videos=4, inverse_dynamics_updates=3, cloning_updates=4, repeat_every=60, batch_size=8
+        share=0.5,
+        videos=4,
+        inverse_dynamics_updates=3,
+        cloning_updates=4,
+        repeat_every=60,
+        repeat_until=20_000,
+        repeat_share=0.5,
+        batch_size=8,
     ),
 )
 """The same, starting as a clone of the expert videos."""

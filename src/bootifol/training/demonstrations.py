@@ -58,14 +58,14 @@ class DemonstrationConfig:
     cloning_learning_rate: float = 1e-3
     """Of Adam at its highest, rising and falling likewise."""
 
-    repeat_every: int = 6000
-    """Agent steps from one Cloning Phase to the next: the inverse dynamics has newer steps to learn from, and every
-    demonstration gets its actions and rewards anew."""
+    repeat_every: int = 1500
+    """Agent steps from one Cloning Phase to the next: steps of a policy that moves like the expert teach the inverse
+    dynamics what random ones cannot, and every demonstration gets its actions and rewards anew."""
 
-    repeat_until: int = 20_000
-    """Agent steps after which no further Cloning Phase begins, so that the last one is not cut off by the end."""
+    repeat_until: int = 9000
+    """Agent steps after which no further Cloning Phase begins, and only the rewards teach."""
 
-    repeat_share: float = 0.5
+    repeat_share: float = 1.0
     """Gradient steps of each later Cloning Phase, as a share of the first one's."""
 
     batch_size: int = 128

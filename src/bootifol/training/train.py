@@ -168,11 +168,10 @@ class Run:
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()
-        if self.counters.cloning_phases == 1:
-            watch = Stopwatch()
-            self._evaluate_while_training()
-            self.counters.cloning_seconds += watch.lap()
-            self._checkpoint()
+        watch = Stopwatch()
+        self._evaluate_while_training()
+        self._checkpoint()
+        self.counters.cloning_seconds += watch.lap()
         return True
 
     def _interact(self, interruption: Interruption) -> bool:
