@@ -16,7 +16,7 @@ class Task:
     """One entry of the catalogue."""
 
     name: str
-    suite: Literal["DeepMind Control", "drawn with numpy"]
+    suite: Literal["DeepMind Control", "Meta-World", "drawn with numpy"]
     description: str
     make_simulator: Callable[[PictureConfig], Simulator]
     action_repeat: int
@@ -37,6 +37,15 @@ def _reacher_hard(pictures: PictureConfig) -> Simulator:
     from bootifol.envs.dm_control import DMControlSimulator
 
     return DMControlSimulator("reacher", "hard", pictures)
+
+
+def _meta_world(name: str) -> Callable[[PictureConfig], Simulator]:
+    def make(pictures: PictureConfig) -> Simulator:
+        from bootifol.envs.meta_world import MetaWorldSimulator
+
+        return MetaWorldSimulator(name, pictures)
+
+    return make
 
 
 def _drawn_reach(pictures: PictureConfig) -> Simulator:
@@ -65,6 +74,39 @@ TASKS = {
             evaluation_steps=500,
             expert_return=980.5,
             random_return=14.1,
+        ),
+        Task(
+            name="button_press",
+            suite="Meta-World",
+            description="press a button on the front of a box with a robot arm's gripper",
+            make_simulator=_meta_world("button-press-v3"),
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=2.0,
+            random_return=1.0,
+        ),
+        Task(
+            name="plate_slide",
+            suite="Meta-World",
+            description="slide a plate over the table into a goal with a robot arm's gripper",
+            make_simulator=_meta_world("plate-slide-v3"),
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=2.0,
+            random_return=1.0,
+        ),
+        Task(
+            name="drawer_close",
+            suite="Meta-World",
+            description="push an open drawer shut with a robot arm's gripper",
+            make_simulator=_meta_world("drawer-close-v3"),
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=2.0,
+            random_return=1.0,
         ),
         Task(
             name="drawn_reach",
