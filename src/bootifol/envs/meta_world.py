@@ -15,9 +15,9 @@ from bootifol.errors import BootifolError
 from bootifol.types import Action, Frame
 
 CAMERA = "corner4"
-"""Looks over the table from a corner, near enough that a button is some pixels wide at 64x64. The paper's release took
-Meta-World's camera of the time, corner2: the same direction from 1.7 times as far. Work that learns Meta-World from
-pixels commonly moves corner2 to where corner4 now is."""
+"""Looks over the table from a corner, near enough that a button is some pixels wide at 64x64. The paper's release
+took Meta-World's camera of the time, corner2: the same direction from about 1.6 times as far. Work that learns
+Meta-World from pixels commonly moves corner2 to where corner4 now is."""
 
 
 class MetaWorldSimulator:
