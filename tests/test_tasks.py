@@ -9,14 +9,18 @@ from bootifol.tasks import TASKS, make_environment, task_named
 @pytest.mark.parametrize("task", TASKS.values(), ids=list(TASKS))
 def test_the_catalogue_is_consistent(task: object) -> None:
     assert task is task_named(task.name)  # type: ignore[attr-defined]
-    assert 0 < task.random_return < 0.1 * task.expert_return  # type: ignore[attr-defined]
+    meta_world = task.suite == "Meta-World"  # type: ignore[attr-defined]
+    # Meta-World rewards up to 10 a simulator step, and a little for being near.
+    share, most_a_step = (0.3, 10.0) if meta_world else (0.1, 1.0)
+    assert 0 < task.random_return < share * task.expert_return  # type: ignore[attr-defined]
     steps = task.evaluation_steps * task.action_repeat  # type: ignore[attr-defined]
-    assert task.expert_return <= steps  # type: ignore[attr-defined]
+    assert task.expert_return <= most_a_step * steps  # type: ignore[attr-defined]
     assert 0 < task.episode_steps <= task.evaluation_steps  # type: ignore[attr-defined]
 
 
-def test_reacher_hard_is_the_papers_task() -> None:
-    task = task_named("reacher_hard")
+@pytest.mark.parametrize("name", ["reacher_hard", "button_press", "plate_slide", "drawer_close"])
+def test_the_papers_tasks_have_its_lengths(name: str) -> None:
+    task = task_named(name)
     assert (task.action_repeat, task.episode_steps, task.evaluation_steps) == (2, 60, 500)
 
 

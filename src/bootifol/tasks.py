@@ -16,7 +16,7 @@ class Task:
     """One entry of the catalogue."""
 
     name: str
-    suite: Literal["DeepMind Control", "drawn with numpy"]
+    suite: Literal["DeepMind Control", "Meta-World", "drawn with numpy"]
     description: str
     make_simulator: Callable[[PictureConfig], Simulator]
     action_repeat: int
@@ -39,6 +39,15 @@ def _reacher_hard(pictures: PictureConfig) -> Simulator:
     return DMControlSimulator("reacher", "hard", pictures)
 
 
+def _meta_world(name: str) -> Callable[[PictureConfig], Simulator]:
+    def make(pictures: PictureConfig) -> Simulator:
+        from bootifol.envs.meta_world import MetaWorldSimulator
+
+        return MetaWorldSimulator(name, pictures)
+
+    return make
+
+
 def _drawn_reach(pictures: PictureConfig) -> Simulator:
     from bootifol.envs.drawn import DrawnReach
 
@@ -51,7 +60,8 @@ def _drawn_home(pictures: PictureConfig) -> Simulator:
     return DrawnReach(pictures, fixed_target=(0.45, -0.3))
 
 
-# The returns were measured with `bootifol tasks --measure 50`.
+# The returns were measured with `bootifol tasks --measure 50`, Meta-World's with `--measure 8` (random actions in
+# drawer_close, where chance decides, with 40 episodes; docs/tasks.md).
 TASKS = {
     task.name: task
     for task in (
@@ -65,6 +75,39 @@ TASKS = {
             evaluation_steps=500,
             expert_return=980.5,
             random_return=14.1,
+        ),
+        Task(
+            name="button_press",
+            suite="Meta-World",
+            description="press a button on the front of a box with a robot arm's gripper",
+            make_simulator=_meta_world("button-press-v3"),
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=1154.5,
+            random_return=300.0,
+        ),
+        Task(
+            name="plate_slide",
+            suite="Meta-World",
+            description="slide a plate over the table into a goal with a robot arm's gripper",
+            make_simulator=_meta_world("plate-slide-v3"),
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=9563.7,
+            random_return=370.5,
+        ),
+        Task(
+            name="drawer_close",
+            suite="Meta-World",
+            description="push an open drawer shut with a robot arm's gripper",
+            make_simulator=_meta_world("drawer-close-v3"),
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=9241.2,
+            random_return=2102.9,
         ),
         Task(
             name="drawn_reach",

@@ -11,6 +11,7 @@ from bootifol import tasks as catalogue
 from bootifol.cli import doctor as doctor_command
 from bootifol.cli.main import main
 from bootifol.envs import camera
+from bootifol.envs.drawn import DrawnReach
 from bootifol.tasks import TASKS
 
 
@@ -117,10 +118,13 @@ def test_tasks_prints_the_catalogue(capsys: pytest.CaptureFixture[str]) -> None:
 def test_tasks_measures_expert_and_random_on_evaluation_episodes(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.delitem(TASKS, "reacher_hard")
-    monkeypatch.delitem(TASKS, "drawn_home")
-    assert main(["tasks", "--measure", "3"]) == 0
+    def painted(self: DrawnReach) -> Any:
+        raise AssertionError("nobody looks at the pictures")
+
+    monkeypatch.setattr(DrawnReach, "render", painted)
+    assert main(["tasks", "--task", "drawn_reach", "--measure", "3"]) == 0
     captured = capsys.readouterr()
+    assert "drawn_home" not in captured.out
     assert "drawn_reach, expert: 3/3" in captured.err
     rows = [line.strip("│ ").split("│") for line in captured.out.splitlines() if "±" in line and "│" in line]
     assert [(row[1].strip(), row[2].strip()) for row in rows] == [("expert", "3"), ("random", "3")]
@@ -130,8 +134,13 @@ def test_tasks_measures_expert_and_random_on_evaluation_episodes(
     assert random < 10
     low, high = (float(number) for number in rows[0][4].split("…"))
     assert low <= expert <= high
+    # The dot is within the target at some step of every expert episode.
+    assert float(rows[0][5]) == 1.0
+    assert 0.0 <= float(rows[1][5]) < 1.0
 
 
 def test_tasks_refuses_a_negative_number_of_episodes(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tasks", "--measure", "-1"]) == 2
     assert "--measure is a number of episodes, not -1" in capsys.readouterr().err
+    assert main(["tasks", "--task", "juggling"]) == 2
+    assert "there is no task 'juggling'" in capsys.readouterr().err

@@ -99,6 +99,17 @@ def test_one_picture_a_step_serves_agent_and_reward_model() -> None:
     assert [int(info["video_frame"][0, 0, 0]) for info in infos] == [0, 1, 2, 3, 4]
 
 
+def test_where_nobody_looks_nothing_is_painted() -> None:
+    environment, simulator = counting()
+    environment.rendered = False
+    seen, _ = environment.reset(seed=0)
+    after, reward, *_ = environment.step(NOTHING)
+    assert not seen.any()
+    assert not after.any()
+    assert simulator.renders == 0
+    assert reward > 0
+
+
 def test_equal_sizes_share_one_array() -> None:
     environment, _ = counting(PictureConfig(agent_size=8, video_size=8))
     _, info = environment.reset(seed=0)
@@ -143,7 +154,7 @@ def test_closing_closes_the_simulator() -> None:
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("task", list(TASKS))
 def test_gymnasium_approves(task: str, request: pytest.FixtureRequest) -> None:
-    if task != "drawn_reach":
+    if not task.startswith("drawn"):
         request.getfixturevalue("requires_rendering")
     environment = make_environment(task, PictureConfig(agent_size=36, video_size=8), 4)
     assert isinstance(environment, gymnasium.Env)

@@ -55,6 +55,8 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
         self.pictures = pictures
         self.action_repeat = action_repeat
         self.episode_steps = episode_steps
+        self.rendered = True
+        """False where nobody looks at the pictures: they are black then, and cost nothing."""
         self.metadata = {
             "render_modes": [],
             "render_fps": round(1.0 / (action_repeat * simulator.step_seconds), 6),
@@ -109,7 +111,8 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
         self.simulator.close()
 
     def _look(self) -> dict[str, Any]:
-        picture = self.simulator.render()
+        size = self.pictures.picture_size
+        picture = self.simulator.render() if self.rendered else np.zeros((size, size, 3), np.uint8)
         return {
             "frame": resize(picture, self.pictures.agent_size),
             "video_frame": resize(picture, self.pictures.video_size),

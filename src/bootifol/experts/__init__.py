@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
-from bootifol.experts import drawn_reach, reacher
+from bootifol.experts import drawn_reach, meta_world, reacher
 from bootifol.experts.behaviors import (
     Behavior,
     Controller,
@@ -78,6 +78,10 @@ def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Contr
             return drawn_reach.move(simulator.dot, simulator.target if goal is None else goal)
 
         return move, lambda rng: drawn_reach.wrong_place(simulator.target, rng)
+    if task_name in meta_world.GOALS:
+        return meta_world.script(task_name, simulator), lambda rng: meta_world.wrong_place(
+            task_name, simulator, rng
+        )
     raise BootifolError(f"there is no expert for the task {task_name}; import videos of it instead")
 
 

@@ -15,7 +15,17 @@ from bootifol.files import read_json, write_json
 from bootifol.training.config import TrainingConfig
 
 FORMAT = 1
-_PACKAGES = ("bootifol", "torch", "numpy", "mujoco", "dm-control", "gymnasium", "numba", "safetensors")
+_PACKAGES = (
+    "bootifol",
+    "torch",
+    "numpy",
+    "mujoco",
+    "dm-control",
+    "metaworld",
+    "gymnasium",
+    "numba",
+    "safetensors",
+)
 _Config = TypeVar("_Config")
 
 
