@@ -233,7 +233,7 @@ def test_without_pyarrow_a_sentence_says_what_to_install(
     whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    with pytest.raises(BootifolError, match=r"pip install 'bootifol\[lerobot\]'"):
+    with pytest.raises(BootifolError, match="pip install pyarrow"):
         lerobot_episodes(whole)
 
 

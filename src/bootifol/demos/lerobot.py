@@ -9,7 +9,6 @@ Format: https://huggingface.co/docs/lerobot/lerobot-dataset-v3
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -112,8 +111,8 @@ def parquet_library() -> Any:
         import pyarrow.parquet
     except ImportError as error:
         raise BootifolError(
-            "LeRobot datasets keep their tables in parquet files, for which pyarrow is missing: "
-            "`pip install 'bootifol[lerobot]'`"
+            "LeRobot datasets keep their tables in parquet files, for which pyarrow is missing: install it with "
+            "`pip install pyarrow`, or bootifol with its extra `lerobot`"
         ) from error
     return pyarrow.parquet
 
@@ -218,7 +217,7 @@ def _read_rows(dataset: Path, camera: str) -> list[_Row]:
                     f"{file} has no column {', '.join(missing)}: copy or download the whole dataset again"
                 )
             rows += [_Row(file, values) for values in table.select(columns).to_pylist()]
-        except (pyarrow.ArrowException, OSError, ValueError) as error:
+        except (pyarrow.ArrowException, OSError, ValueError, LookupError) as error:
             raise BootifolError(f"{file} is damaged or no parquet file ({error}): copy it again") from error
     return rows
 
@@ -250,13 +249,15 @@ def _video_file(dataset: Path, info: dict[str, Any], **fields: str | int) -> Pat
     except (ValueError, LookupError, AttributeError) as error:
         raise _damaged(dataset / INFO_PATH, "video_path", template) from error
     # Not Path.resolve: downloaded datasets link to files elsewhere, but no template may lead there.
-    if not isinstance(template, str) or Path(relative).is_absolute() or relative.startswith(".."):
+    unfit = Path(relative).is_absolute() or relative.startswith("..") or len(relative) > 1000
+    if not isinstance(template, str) or unfit:
         raise _damaged(dataset / INFO_PATH, "video_path", template)
     return dataset / relative
 
 
 def _number(value: Any, file: Path, what: str) -> float:
-    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+    # The bound refuses NaN and infinity, too.
+    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < 1e9:
         raise _damaged(file, what, value)
     return float(value)
 
