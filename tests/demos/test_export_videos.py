@@ -128,3 +128,23 @@ def test_a_name_that_leads_elsewhere_is_refused(write_set: WriteSet, tmp_path: P
     with pytest.raises(BootifolError, match="is no file name"):
         export_videos(demos, tmp_path / "out", "npy")
     assert not (tmp_path / "outside.npy").exists()
+
+
+def test_a_video_longer_than_its_set_is_refused(write_set: WriteSet, tmp_path: Path) -> None:
+    demos = shortened(write_set(smooth_videos(1)), 0, 6)
+    with pytest.raises(BootifolError, match="drawn-expert-000000 has 6 of 5 frames"):
+        export_videos(demos, tmp_path / "out", "npy")
+
+
+def test_an_interrupted_export_leaves_nothing(
+    write_set: WriteSet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    demos = write_set(smooth_videos(2))
+
+    def interrupted(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bootifol.demos.export_videos.write_video", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        export_videos(demos, tmp_path / "out", "mp4")
+    assert list(tmp_path.iterdir()) == [demos]
