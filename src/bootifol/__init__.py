@@ -18,6 +18,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from bootifol.demos.export_videos import export_videos as export_videos
     from bootifol.demos.import_videos import import_videos as import_videos
     from bootifol.demos.record import record_demos as record_demos
     from bootifol.errors import BootifolError as BootifolError
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 __version__ = version("bootifol")
 
 _WHERE = {
+    "export_videos": ("bootifol.demos.export_videos", "export_videos"),
     "import_videos": ("bootifol.demos.import_videos", "import_videos"),
     "record_demos": ("bootifol.demos.record", "record_demos"),
     "BootifolError": ("bootifol.errors", "BootifolError"),
@@ -44,6 +46,7 @@ _WHERE = {
 __all__ = [
     "BootifolError",
     "evaluate",
+    "export_videos",
     "import_videos",
     "record_demos",
     "report",

@@ -78,6 +78,19 @@ def test_import_takes_a_folder_of_videos(tmp_path: Path, capsys: pytest.CaptureF
     assert "nothing moves in demos-expert-000000" in printed
 
 
+def test_export_writes_what_import_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    record(tmp_path / "demos", "--behaviors", "random")
+    out, back = tmp_path / "out", tmp_path / "back"
+    arguments = [str(tmp_path / "demos"), "--out", str(out), "--format", "npy", "--behavior", "random"]
+    assert tyro.cli(demos.export, args=[*arguments, "--videos", "2"]) == 0
+    assert f"{out}: 2 videos as npy" in capsys.readouterr().out
+    assert tyro.cli(demos.import_, args=[str(out), "--out", str(back), "--frames", "31", "--size", "16"]) == 0
+    recorded = DemoSet.open(tmp_path / "demos" / "random").gather([0, 1])
+    np.testing.assert_array_equal(DemoSet.open(back / "expert").gather([0, 1]), recorded)
+    with pytest.raises(BootifolError, match="no expert videos: choose among --behavior random"):
+        demos.export(tmp_path / "demos", tmp_path / "other")
+
+
 def test_wrong_places_give_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(BootifolError, match="there is no demo set at"):
         demos.check(tmp_path / "nowhere")

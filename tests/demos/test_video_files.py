@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bootifol.demos.video_files import frame_rate, read_video, stream_video, write_video
+from bootifol.demos.video_files import (
+    frame_rate,
+    read_video,
+    stream_part,
+    stream_video,
+    video_paths,
+    write_video,
+)
 from bootifol.errors import BootifolError
 
 
@@ -118,6 +125,61 @@ def test_arrays_are_read(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", blocks())
     np.testing.assert_array_equal(read_video(tmp_path / "a.npy"), blocks())
     assert frame_rate(tmp_path / "a.npy") is None
+
+
+def test_the_video_in_an_archive_is_found_among_other_arrays(tmp_path: Path) -> None:
+    actions = np.zeros((20, 2), np.float32)
+    np.savez_compressed(tmp_path / "a.npz", actions=actions, pictures=blocks())
+    np.testing.assert_array_equal(read_video(tmp_path / "a.npz"), blocks())
+    assert frame_rate(tmp_path / "a.npz") is None
+    assert video_paths([tmp_path]) == [tmp_path / "a.npz"]
+
+
+def test_an_archive_without_one_video_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, left=blocks(2, 4, 4), right=blocks(3, 4, 4))
+    with pytest.raises(BootifolError, match=r"2 arrays .* among left uint8 \[2, 4, 4, 3\], right uint8 \["):
+        read_video(path)
+    np.savez(path, actions=np.zeros((20, 2)))
+    with pytest.raises(BootifolError, match=r"holds no arrays .* among actions float64 \[20, 2\]"):
+        read_video(path)
+    np.savez(path)
+    with pytest.raises(BootifolError, match="among nothing"):
+        read_video(path)
+
+
+def test_nothing_in_an_archive_is_unpickled(tmp_path: Path) -> None:
+    notes = np.array([{"a": 1}], dtype=object)
+    np.savez(tmp_path / "a.npz", allow_pickle=True, notes=notes, pictures=blocks(2, 4, 4))
+    np.testing.assert_array_equal(read_video(tmp_path / "a.npz"), blocks(2, 4, 4))
+    np.savez(tmp_path / "b.npz", allow_pickle=True, notes=notes)
+    with pytest.raises(BootifolError, match=r"no arrays .* among notes object"):
+        read_video(tmp_path / "b.npz")
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed", "other"])
+def test_a_damaged_archive_is_refused_by_name(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, pictures=blocks(2, 8, 8))
+    data = bytearray(path.read_bytes())
+    if damage == "cut":
+        data = data[:-30]
+    elif damage == "changed":
+        data[300] ^= 1
+    else:
+        data = bytearray(b"hello")
+    path.write_bytes(data)
+    with pytest.raises(BootifolError, match=r"a\.npz is damaged"):
+        read_video(path)
+
+
+def test_a_part_of_a_file_is_read_from_its_key_frame_on(tmp_path: Path) -> None:
+    write_video(tmp_path / "a.mp4", blocks(), 10)
+    whole = read_video(tmp_path / "a.mp4")
+    part = list(stream_part(tmp_path / "a.mp4", 0.65, 1.05))
+    np.testing.assert_array_equal(np.stack([timed.frame for timed in part]), whole[7:11])
+    assert [timed.seconds for timed in part] == pytest.approx([0, 0.1, 0.2, 0.3])
+    assert list(stream_part(tmp_path / "a.mp4", 7, 8)) == []
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""`bootifol demos record | import | check`: videos in."""
+"""`bootifol demos record | import | check | export`: videos in and out."""
 
 from __future__ import annotations
 
@@ -73,8 +73,12 @@ def import_(
     fps: float | None = None,
     windows: Literal["all", "first"] = "all",
     behavior: Literal["expert", "half_good", "random"] = "expert",
+    camera: str | None = None,
 ) -> int:
     """Make a demo set from your own videos: mp4, mov, webm or gif files, folders of png or jpg pictures, .npy arrays.
+
+    A .npz archive may hold one such array among others. A LeRobot dataset of format v3 (its directory) gives one
+    video an episode: its pictures alone, never its actions or states.
 
     The largest centered square of every picture is cut out and resized. What was done to which file is written down
     in OUT/BEHAVIOR/manifest.json, and OUT/BEHAVIOR/contact_sheet.png shows the result.
@@ -87,16 +91,19 @@ def import_(
         fps: Pictures per second, which should be the environment's; by default every picture is kept.
         windows: all cuts a long file into one video after another; first takes the beginning of each file.
         behavior: What the videos show.
+        camera: Which camera of a LeRobot dataset to take, when it has several.
     """
     from bootifol.demos.import_videos import Conversion, import_videos
     from bootifol.demos.video_files import video_paths
 
     files = video_paths(videos)
     conversion = Conversion(frames=frames, size=size, frames_per_second=fps, windows=windows)
-    demo_set = import_videos(files, out / behavior, conversion, behavior)
+    demo_set = import_videos(files, out / behavior, conversion, behavior, camera=camera)
     manifest = demo_set.manifest
     short = sum(video.length < manifest.frames for video in manifest.videos)
-    print(f"{demo_set.path}: {_summary(manifest)}, from {_count(len(files), 'file')}")
+    recordings = sum(video.source["first_frame"] == 0 for video in manifest.videos)
+    what = "episode" if all("episode" in video.source for video in manifest.videos) else "file"
+    print(f"{demo_set.path}: {_summary(manifest)}, from {_count(recordings, what)}")
     if short:
         print(f"  {short} shorter than {frames} frames: they stand still on their last picture")
     print(f"  look at {demo_set.path / 'contact_sheet.png'}")
@@ -138,6 +145,34 @@ def check(demos: Annotated[Path, tyro.conf.Positional], task: str | None = None)
         print(f"  look at {checked.contact_sheet}")
         fits = fits and not checked.differences
     return 0 if fits else 1
+
+
+def export(
+    demos: Annotated[Path, tyro.conf.Positional],
+    out: Path,
+    format: Literal["mp4", "npy", "lerobot"] = "mp4",
+    behavior: str = "expert",
+    videos: int | None = None,
+    fps: float | None = None,
+) -> int:
+    """Write a demo set's videos as files that other programs read.
+
+    Only frames that were seen are written: a video that ended early is shorter than the set's others.
+
+    Args:
+        demos: Directory of the demo sets, or one of them.
+        out: Directory to write; it must not exist.
+        format: mp4 (one a video, small pictures enlarged), npy (one a video, every pixel as it is) or lerobot (one
+            dataset of format v3, without actions and states).
+        behavior: Which of the sets.
+        videos: Export the first so many; by default all.
+        fps: Pictures per second; by default those of the set.
+    """
+    from bootifol.demos.export_videos import export_videos
+
+    count = export_videos(demos, out, format, behavior, fps, videos)
+    print(f"{out}: {_count(count, 'video')} as {format}")
+    return 0
 
 
 def _summary(manifest: Manifest) -> str:

@@ -21,7 +21,7 @@ A first tour:
   bootifol report runs/first                                          what it learned
 """
 
-DEMOS_DESCRIPTION = "Make, import and check sets of videos to learn from."
+DEMOS_DESCRIPTION = "Make, import, check and export sets of videos to learn from."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -81,13 +81,13 @@ def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
 
 
 def _demos_commands() -> dict[str, Callable[..., int]]:
-    from bootifol.cli.demos import check, import_, record
+    from bootifol.cli.demos import check, export, import_, record
 
-    return {"record": record, "import": import_, "check": check}
+    return {"record": record, "import": import_, "check": check, "export": export}
 
 
 def _demos_placeholder() -> int:
-    """Make, import and check sets of videos to learn from: demos record, demos import, demos check."""
+    """Make, import, check and export sets of videos: demos record, demos import, demos check, demos export."""
     return main(["demos", "--help"])
 
 

@@ -7,12 +7,13 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from bootifol.demos.contact_sheet import write_contact_sheet
 from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.lerobot import LeRobotEpisode, lerobot_episodes
 from bootifol.demos.manifest import Manifest, Shard, VideoEntry, installed_versions, write_manifest
 from bootifol.demos.shards import (
     last_frame_held,
@@ -20,12 +21,15 @@ from bootifol.demos.shards import (
     videos_per_shard,
     write_shard,
 )
-from bootifol.demos.video_files import TimedFrame, frame_rate, stream_video
+from bootifol.demos.video_files import TimedFrame, frame_rate, is_lerobot_dataset, stream_video
 from bootifol.envs.pictures import resize
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.progress import progress
 from bootifol.types import Frame, Frames
+
+Source = Path | LeRobotEpisode
+"""One recording: a file, a folder of pictures, or one episode of a LeRobot dataset."""
 
 
 @dataclass(frozen=True)
@@ -60,18 +64,22 @@ def import_videos(
     conversion: Conversion | None = None,
     behavior: str = "expert",
     name: str | None = None,
+    camera: str | None = None,
 ) -> DemoSet:
     """Writes a demo set from video files; the set appears whole or not at all.
 
     Args:
-        files: video files, folders of pictures (each folder one video) and .npy arrays.
+        files: video files, folders of pictures (each folder one video), .npy and .npz arrays, and LeRobot
+            datasets (each episode one video).
         out: directory of the set; it must not exist.
         conversion: frame rate, length and size of the result.
         behavior: what the videos show.
         name: of the set; `<directory above>-<behavior>` by default.
+        camera: which camera of LeRobot datasets to take; needed where they have several.
 
     Raises:
-        BootifolError: `out` exists, or files are empty, damaged or truncated (all such files are named).
+        BootifolError: `out` exists, files are empty, damaged or truncated (all such files are named), or the
+            camera is unclear.
     """
     conversion = conversion or Conversion()
     out = Path(out)
@@ -80,22 +88,23 @@ def import_videos(
     if not files:
         raise BootifolError("there are no videos to import: name files, or folders of pictures")
     name = name or f"{out.resolve().parent.name}-{behavior}"
+    sources = _sources(files, camera)
     with written_aside(out) as aside:
         aside.mkdir()
-        _write_set(aside, files, conversion, behavior, name)
+        _write_set(aside, sources, conversion, behavior, name)
         write_contact_sheet(aside, DemoSet.open(aside))
     return DemoSet.open(out)
 
 
-def convert(path: Path, conversion: Conversion) -> Iterator[Frames]:
-    """The windows of one video file, uint8 `[n, size, size, 3]`; only the last may have `n` below `frames`.
+def convert(source: Source, conversion: Conversion) -> Iterator[Frames]:
+    """The windows of one recording, uint8 `[n, size, size, 3]`; only the last may have `n` below `frames`.
 
     Raises:
-        BootifolError: the file cannot be read to its end, or has no times to resample by.
+        BootifolError: it cannot be read to its end, or has no times to resample by.
     """
     window: list[Frame] = []
     windows = 0
-    for frame in _resampled(path, conversion.frames_per_second):
+    for frame in _resampled(source, conversion.frames_per_second):
         if conversion.windows == "first" and windows:
             continue  # still read to the end, so that a truncated file is noticed
         window.append(centered_square(frame, conversion.size))
@@ -115,16 +124,45 @@ def centered_square(frame: Frame, size: int) -> Frame:
     return resize(frame[top : top + side, left : left + side], size)
 
 
-def _resampled(path: Path, frames_per_second: float | None) -> Iterator[Frame]:
+def _sources(files: Sequence[Path], camera: str | None) -> list[Source]:
+    """The recordings in these files: a LeRobot dataset stands for its episodes."""
+    if camera is not None and not any(is_lerobot_dataset(file) for file in files):
+        raise BootifolError(
+            f"there is no camera {camera!r} to choose: only LeRobot datasets (directories with meta/info.json) "
+            "have cameras by name"
+        )
+    sources: list[Source] = []
+    for file in files:
+        sources += lerobot_episodes(file, camera) if is_lerobot_dataset(file) else [file]
+    return sources
+
+
+def _stream(source: Source) -> Iterator[TimedFrame]:
+    return source.stream() if isinstance(source, LeRobotEpisode) else stream_video(source)
+
+
+def _rate(source: Source) -> float | None:
+    return source.frames_per_second if isinstance(source, LeRobotEpisode) else frame_rate(source)
+
+
+def _described(source: Source) -> dict[str, Any]:
+    """Where a recording comes from, for the manifest."""
+    if isinstance(source, LeRobotEpisode):
+        dataset = source.dataset.resolve().name
+        return {"file": dataset, "episode": source.index, "camera": source.camera}
+    return {"file": source.name}
+
+
+def _resampled(source: Source, frames_per_second: float | None) -> Iterator[Frame]:
     """The pictures showing at 0, 1/fps, 2/fps … seconds; every picture when no rate is asked for."""
     if frames_per_second is None:
-        yield from (timed.frame for timed in stream_video(path))
+        yield from (timed.frame for timed in _stream(source))
         return
     showing: Frame | None = None
     since = gap = 0.0
     emitted = 0
-    for timed in stream_video(path):
-        seconds = _seconds(path, timed)
+    for timed in _stream(source):
+        seconds = _seconds(source, timed)
         if showing is not None:
             gap = seconds - since
             for _ in range(emitted, _instants_before(seconds, frames_per_second)):
@@ -141,16 +179,16 @@ def _instants_before(seconds: float, frames_per_second: float) -> int:
     return max(0, math.ceil((seconds - 0.0005) * frames_per_second))
 
 
-def _seconds(path: Path, timed: TimedFrame) -> float:
+def _seconds(source: Source, timed: TimedFrame) -> float:
     if timed.seconds is None:
         raise BootifolError(
-            f"{path} has no times to resample by (only video files do): import it without --fps"
+            f"{source} has no times to resample by (only video files do): import it without --fps"
         )
     return timed.seconds
 
 
 def _write_set(
-    directory: Path, files: Sequence[Path], conversion: Conversion, behavior: str, name: str
+    directory: Path, sources: Sequence[Source], conversion: Conversion, behavior: str, name: str
 ) -> None:
     video_bytes = conversion.frames * conversion.size**2 * 3
     per_shard = videos_per_shard(None, video_bytes)
@@ -158,15 +196,15 @@ def _write_set(
     entries: list[VideoEntry] = []
     waiting: list[Frames] = []
     problems: list[str] = []
-    with progress("importing", total=len(files)) as advance:
-        for path in files:
+    with progress("importing", total=len(sources)) as advance:
+        for source in sources:
             try:
-                for window, frames in enumerate(convert(path, conversion)):
+                for window, frames in enumerate(convert(source, conversion)):
                     padded = last_frame_held(frames, conversion.frames)
                     entries.append(
                         VideoEntry(
                             name=f"{name}-{len(entries):06d}",
-                            source={"file": path.name, "first_frame": window * conversion.frames},
+                            source=_described(source) | {"first_frame": window * conversion.frames},
                             length=len(frames),
                             sha256=sha256_of_frames(padded),
                         )
@@ -182,7 +220,7 @@ def _write_set(
         raise BootifolError("\n".join(problems))
     if waiting:
         shards.append(write_shard(directory, len(shards), np.stack(waiting)))
-    rates = {conversion.frames_per_second} if conversion.frames_per_second else {frame_rate(f) for f in files}
+    rates = {conversion.frames_per_second} if conversion.frames_per_second else set(map(_rate, sources))
     write_manifest(
         directory,
         Manifest(

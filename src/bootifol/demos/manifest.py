@@ -35,7 +35,8 @@ class VideoEntry:
 
     name: str
     source: dict[str, Any]
-    """Where it comes from: `{"behavior", "seed"}` when recorded, `{"file", "first_frame"}` when imported."""
+    """Where it comes from: `{"behavior", "seed"}` when recorded, `{"file", "first_frame"}` when imported (and
+    `"episode"`, `"camera"` when the file is a LeRobot dataset)."""
     length: int
     """Frames that were seen. A shorter video stands still on its last frame until the set's length."""
     sha256: str
@@ -162,6 +163,12 @@ def _check_consistent(path: Path, manifest: Manifest) -> None:
             f"{path} contradicts itself: it lists {len(manifest.videos)} videos of {manifest.episodes}; "
             "record or import the set again"
         )
+    for video in manifest.videos:
+        if video.length > manifest.frames:
+            raise BootifolError(
+                f"{path} contradicts itself: {video.name} has {video.length} of {manifest.frames} frames; "
+                "record or import the set again"
+            )
     for shard in manifest.shards:
         if not re.fullmatch(r"shard-\d{5}\.npy", shard.file):
             raise BootifolError(f"{path} names a file that is no shard of its own: {shard.file!r}")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,6 +21,7 @@ from bootifol.files import written_aside
 from bootifol.types import Frame, Frames
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".m4v", ".webm", ".mkv", ".avi", ".gif")
+ARRAY_SUFFIXES = (".npy", ".npz")
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 # People look at these videos: enlarge small pictures to at least this many pixels.
@@ -40,20 +43,22 @@ def video_paths(paths: Sequence[Path]) -> list[Path]:
     """Finds the videos people mean: a folder without pictures of its own stands for the videos in it.
 
     Returns:
-        Files and folders of pictures that `stream_video` reads, folders' contents in natural order of their names.
+        Files and folders of pictures that `stream_video` reads, folders' contents in natural order of their names;
+        and LeRobot datasets, each as its one directory.
 
     Raises:
         BootifolError: a folder holds neither pictures nor videos.
     """
     found: list[Path] = []
     for path in paths:
-        if not path.is_dir() or _pictures(path):
+        if not path.is_dir() or is_lerobot_dataset(path) or _pictures(path):
             found.append(path)
             continue
         inside = [
             child
             for child in sorted(path.iterdir(), key=_natural_order)
-            if child.suffix.lower() in (*VIDEO_SUFFIXES, ".npy") or (child.is_dir() and _pictures(child))
+            if child.suffix.lower() in (*VIDEO_SUFFIXES, *ARRAY_SUFFIXES)
+            or (child.is_dir() and (is_lerobot_dataset(child) or _pictures(child)))
         ]
         if not inside:
             raise BootifolError(
@@ -63,12 +68,18 @@ def video_paths(paths: Sequence[Path]) -> list[Path]:
     return found
 
 
+def is_lerobot_dataset(path: Path) -> bool:
+    """Whether a directory is laid out as a LeRobot dataset; `demos.lerobot` reads those."""
+    return (path / "meta" / "info.json").is_file()
+
+
 def stream_video(path: Path) -> Iterator[TimedFrame]:
     """Decodes a video picture by picture, so that a long one fits in memory.
 
     Args:
         path: an mp4, mov, webm, gif … file; a folder of png or jpg pictures, taken in natural order of their
-            names (`frame2` before `frame10`); or a .npy file, uint8 `[frames, H, W, 3]`.
+            names (`frame2` before `frame10`); a .npy file, uint8 `[frames, H, W, 3]`; or a .npz file with one
+            such array among its arrays.
 
     Raises:
         BootifolError: the file is missing, empty, damaged, truncated or no video; at the latest at its end.
@@ -81,12 +92,14 @@ def stream_video(path: Path) -> Iterator[TimedFrame]:
         raise BootifolError(f"{path} is empty (0 bytes): copy or export it again")
     elif path.suffix.lower() == ".npy":
         yield from _stream_array(path)
+    elif path.suffix.lower() == ".npz":
+        yield from _stream_archive(path)
     elif path.suffix.lower() in VIDEO_SUFFIXES:
         yield from _stream_file(path)
     else:
         raise BootifolError(
-            f"{path} is not a video bootifol reads: give {', '.join(VIDEO_SUFFIXES)} or .npy files, "
-            "or folders of png or jpg pictures"
+            f"{path} is not a video bootifol reads: give {', '.join(VIDEO_SUFFIXES)}, .npy or .npz "
+            "files, or folders of png or jpg pictures"
         )
 
 
@@ -120,23 +133,57 @@ def write_video(path: Path, frames: Frames, frames_per_second: float) -> None:
     """
     if frames.ndim != 4 or frames.shape[-1] != 3 or frames.size == 0 or frames.dtype != np.uint8:
         raise BootifolError(f"{path}: a video needs uint8 frames [n, H, W, 3], not {list(frames.shape)}")
-    if not frames_per_second > 0:
-        raise BootifolError(f"{path}: frames per second must be positive, not {frames_per_second}")
+    rate = exact_rate(frames_per_second)
     height, width = frames.shape[1:3]
     factor = math.ceil(_SMALLEST_SHOWN / max(height, width))
     if factor % 2 and (height % 2 or width % 2):
         factor += 1
     with (
         written_aside(path) as aside,
-        av.open(str(aside), "w", format="mp4", options={"movflags": "+faststart"}) as container,
+        encoded_video(
+            aside, (height * factor, width * factor), rate, "yuv420p", {"crf": "18", "preset": "fast"}
+        ) as add,
     ):
-        rate = Fraction(frames_per_second).limit_denominator(1001)
-        stream = container.add_stream("libx264", rate=rate, options={"crf": "18", "preset": "fast"})
-        stream.width, stream.height, stream.pix_fmt = width * factor, height * factor, "yuv420p"
-        stream.thread_count = 1  # the same bytes on every machine
         for frame in frames:
-            enlarged = np.ascontiguousarray(frame.repeat(factor, axis=0).repeat(factor, axis=1))
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(enlarged, format="rgb24")))
+            add(np.ascontiguousarray(frame.repeat(factor, axis=0).repeat(factor, axis=1)))
+
+
+def exact_rate(frames_per_second: float) -> Fraction:
+    """Frames per second as the fraction that video files store: 29.97 is 2997/100.
+
+    Raises:
+        BootifolError: it is not positive, or beyond what video files can hold.
+    """
+    if not 0.001 <= frames_per_second <= 1000:
+        raise BootifolError(f"frames per second must be between 0.001 and 1000, not {frames_per_second}")
+    return Fraction(frames_per_second).limit_denominator(1001)
+
+
+@contextmanager
+def encoded_video(
+    path: Path, size: tuple[int, int], rate: Fraction, pixel_format: str, options: dict[str, str]
+) -> Iterator[Callable[[Frame], None]]:
+    """An H.264 mp4 with its index first, written frame by frame; the caller writes aside.
+
+    Args:
+        path: the file, whatever its suffix.
+        size: height and width in pixels.
+        rate: frames per second.
+        pixel_format: `yuv420p` plays everywhere and wants even sides; `yuv444p` keeps every pixel's color.
+        options: of the encoder x264.
+
+    Yields:
+        A function that adds one frame, uint8 `[H, W, 3]`.
+    """
+    with av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as container:
+        stream = container.add_stream("libx264", rate=rate, options=options)
+        (stream.height, stream.width), stream.pix_fmt = size, pixel_format
+        stream.thread_count = 1  # the same bytes on every machine
+
+        def add(frame: Frame) -> None:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
+
+        yield add
         container.mux(stream.encode(None))
 
 
@@ -184,6 +231,46 @@ def _stream_array(path: Path) -> Iterator[TimedFrame]:
         yield TimedFrame(np.array(frame), None)
 
 
+def _stream_archive(path: Path) -> Iterator[TimedFrame]:
+    try:
+        inside = _arrays_inside(path)
+        videos = [
+            name
+            for name, (shape, dtype) in inside.items()
+            if dtype == np.uint8 and len(shape) == 4 and shape[-1] == 3 and math.prod(shape) > 0
+        ]
+        if len(videos) != 1:
+            listed = ", ".join(f"{name} {dtype} {list(shape)}" for name, (shape, dtype) in inside.items())
+            raise BootifolError(
+                f"{path} holds {len(videos) or 'no'} arrays that could be the video, uint8 [frames, height, "
+                f"width, 3], among {listed or 'nothing'}: save the one video alone"
+            )
+        frames = np.load(path, allow_pickle=False)[videos[0]]
+    except (ValueError, OSError, EOFError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        raise BootifolError(f"{path} is damaged or no .npz archive: {error}") from error
+    for frame in frames:
+        yield TimedFrame(np.array(frame), None)
+
+
+def _arrays_inside(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[np.generic]]]:
+    """Shape and type of the arrays in an archive by their names; only the headers are read, nothing is unpickled."""
+    inside = {}
+    with zipfile.ZipFile(path) as archive:
+        for member in archive.namelist():
+            if not member.endswith(".npy"):
+                continue
+            with archive.open(member) as file:
+                version = np.lib.format.read_magic(file)
+                read_header = (
+                    np.lib.format.read_array_header_1_0
+                    if version == (1, 0)
+                    else np.lib.format.read_array_header_2_0
+                )
+                shape, _, dtype = read_header(file)
+            inside[member.removesuffix(".npy")] = (shape, dtype)
+    return inside
+
+
 def _stream_file(path: Path) -> Iterator[TimedFrame]:
     count = 0
     first = end = 0.0
@@ -218,6 +305,39 @@ def _stream_file(path: Path) -> Iterator[TimedFrame]:
         raise BootifolError(
             f"{path} is truncated: the mark at a gif's end is missing; copy or export it again"
         )
+
+
+def stream_part(path: Path, start: float, end: float) -> Iterator[TimedFrame]:
+    """Decodes the pictures of a video file that appear from `start` until before `end`, in seconds of its clock.
+
+    The file is entered at the key frame before `start`, not at its beginning. How many pictures there ought to be
+    is for the caller to check.
+
+    Raises:
+        BootifolError: the file is damaged before `end`.
+    """
+    first: float | None = None
+    with _opened(path) as container:
+        stream = container.streams.video[0]
+        try:
+            if start > 0 and stream.time_base:
+                container.seek(int(start / stream.time_base), stream=stream)
+            for frame in container.decode(stream):
+                if frame.time is None or frame.time < start:
+                    continue
+                if frame.time >= end:
+                    return
+                if frame.is_corrupt:
+                    raise BootifolError(
+                        f"{path} is damaged: the picture at {frame.time:.2f} s is corrupt; copy or export it again"
+                    )
+                first = frame.time if first is None else first
+                yield TimedFrame(_upright(frame), frame.time - first)
+        except av.FFmpegError as error:
+            raise BootifolError(
+                f"{path} is damaged or truncated between {start:.2f} and {end:.2f} s ({error.strerror}): "
+                "copy or export it again"
+            ) from error
 
 
 @contextmanager
