@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Annotated
+
+import tyro
 from rich.console import Console
 from rich.table import Table
 
 from bootifol.errors import BootifolError
-from bootifol.tasks import TASKS
+from bootifol.tasks import TASKS, Task, task_named
 
 
-def tasks(measure: int = 0) -> int:
+def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure: int = 0) -> int:
     """List the tasks, the lengths of their episodes, and the returns of their expert and of random actions.
 
     Args:
+        names: Tasks to list; the whole catalogue by default. gymnasium:ID and MODULE:FUNCTION are tasks, too.
         measure: Play this many evaluation episodes (seeds 0, 1, …) of each task's expert and of random actions, and
             print their mean return, standard deviation and 95% interval.
     """
@@ -21,32 +26,39 @@ def tasks(measure: int = 0) -> int:
     catalogue = Table(
         "task", "suite", "action repeat", "steps", "evaluation steps", "expert return", "random return"
     )
-    for task in TASKS.values():
+    listed = [task_named(name) for name in names] or list(TASKS.values())
+    for task in listed:
         catalogue.add_row(
             task.name,
             task.suite,
             str(task.action_repeat),
             str(task.episode_steps),
             str(task.evaluation_steps),
-            f"{task.expert_return:g}" if task.has_expert else "–",
-            f"{task.random_return:g}",
+            "–" if task.expert_return is None else f"{task.expert_return:g}",
+            "–" if task.random_return is None else f"{task.random_return:g}",
         )
     for column in catalogue.columns[:2]:
         column.no_wrap = True
     console = Console()
     console.print(catalogue)
-    for task in TASKS.values():
+    for task in listed:
         console.print(f"{task.name}: {task.description}", highlight=False)
     console.print(
         "steps: agent steps of a training episode; the returns are means over evaluation episodes",
         style="dim",
     )
+    if not names:
+        console.print(
+            "any Gymnasium environment with continuous actions is a task, too: gymnasium:ID, or MODULE:FUNCTION",
+            style="dim",
+            highlight=False,
+        )
     if measure:
-        console.print(_measured(measure))
+        console.print(_measured(listed, measure))
     return 0
 
 
-def _measured(episodes: int) -> Table:
+def _measured(listed: Sequence[Task], episodes: int) -> Table:
     """Returns of each task's expert and of random actions, played now."""
     # Imported here: the simulators and scipy would slow down every other command's help.
     import numpy as np
@@ -62,7 +74,7 @@ def _measured(episodes: int) -> Table:
     # Nobody looks at the pictures, so they are as small as they may be.
     pictures = PictureConfig(agent_size=8, video_size=8, stack=1)
     table = Table("task", "who", "episodes", "mean return ± std", "95% interval of the mean")
-    for task in TASKS.values():
+    for task in listed:
         environment = make_environment(task.name, pictures, task.evaluation_steps)
         for who in behaviors if task.has_expert else behaviors[1:]:
             returns: list[float] = []

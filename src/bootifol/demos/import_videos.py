@@ -21,7 +21,7 @@ from bootifol.demos.shards import (
     write_shard,
 )
 from bootifol.demos.video_files import TimedFrame, frame_rate, stream_video
-from bootifol.envs.pictures import resize
+from bootifol.envs.pictures import centered_square
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.progress import progress
@@ -105,14 +105,6 @@ def convert(path: Path, conversion: Conversion) -> Iterator[Frames]:
             window = []
     if window and not windows:
         yield np.stack(window)
-
-
-def centered_square(frame: Frame, size: int) -> Frame:
-    """The largest centered square of a picture `[H, W, 3]`, resized to `[size, size, 3]`."""
-    height, width, _ = frame.shape
-    side = min(height, width)
-    top, left = (height - side) // 2, (width - side) // 2
-    return resize(frame[top : top + side, left : left + side], size)
 
 
 def _resampled(path: Path, frames_per_second: float | None) -> Iterator[Frame]:

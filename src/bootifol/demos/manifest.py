@@ -14,7 +14,7 @@ from bootifol.files import read_json, write_json
 
 FORMAT = 1
 MANIFEST_NAME = "manifest.json"
-_PACKAGES = ("bootifol", "mujoco", "dm-control", "numpy", "pillow", "av")
+_PACKAGES = ("bootifol", "mujoco", "dm-control", "gymnasium", "pygame-ce", "numpy", "pillow", "av")
 
 
 @dataclass(frozen=True)
