@@ -79,8 +79,10 @@ def findings(run: RunFiles) -> list[Finding]:
 
 def _policy(run: RunFiles) -> Finding | None:
     final = final_return(run)
-    if final is None or final.scaled_return is None:
+    if final is None:
         return None
+    if final.scaled_return is None:
+        return _policy_without_scale(run, final)
     value = final.scaled_return.mean
     levels = run.return_levels(final.episode_steps)
     ends = "" if levels is None else f" (random {number(levels[0])}, expert {number(levels[1])})"
@@ -94,6 +96,23 @@ def _policy(run: RunFiles) -> Finding | None:
         f"{value:.0%} of the way from random to expert{solved}."
     )
     return Finding(_verdict(value, good=0.8, fair=0.2), text)
+
+
+def _policy_without_scale(run: RunFiles, final: FinalReturn) -> Finding:
+    """Nobody measured an expert: what can be said are successes, and random actions from a few starts."""
+    count = final.environment_return.count
+    random = [
+        video.environment_return
+        for (kind, _), video in run.showcase.items()
+        if kind == "random" and video.environment_return is not None
+    ]
+    text = f"The policy returns {number(final.environment_return.mean)} in at most {final.episode_steps} agent steps"
+    if random:
+        text += f" (random actions from {len(random)} starts, in training episodes: {number(float(np.mean(random)))})"
+    if final.successes is not None:
+        verdict = _verdict(final.successes / count, good=0.8, fair=0.2)
+        return Finding(verdict, f"{text}, {final.successes} of {count} episodes solved.")
+    return Finding("fair", f"{text}; the task has no measured expert, so this has no scale.")
 
 
 def _reward(run: RunFiles) -> Finding | None:
