@@ -39,7 +39,7 @@ def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure:
         )
     for column in catalogue.columns[:2]:
         column.no_wrap = True
-    console = Console()
+    console = Console(emoji=False)
     console.print(catalogue)
     for task in listed:
         console.print(f"{task.name}: {task.description}", highlight=False)

@@ -79,11 +79,13 @@ def _differences_of_recorded(manifest: Manifest, task: Task) -> list[str]:
     if manifest.action_repeat != task.action_repeat:
         found.append(
             f"one frame of the videos is {manifest.action_repeat} simulator steps after the other, and in "
-            f"{task.name} it is {task.action_repeat}: record them again"
+            f"{task.name} it is {task.action_repeat}: record them again with --action-repeat {task.action_repeat}, or "
+            f"pass --action-repeat {manifest.action_repeat} here"
         )
     if manifest.frames < task.episode_steps + 1:
         found.append(
-            f"{_too_short(manifest, task)}: record them again with --episode-steps {task.episode_steps}"
+            f"{_too_short(manifest, task)}: record them again with --episode-steps {task.episode_steps}, or pass "
+            f"--episode-steps {manifest.frames - 1} here"
         )
     return found
 
@@ -92,7 +94,8 @@ def _differences_of_imported(manifest: Manifest, task: Task) -> list[str]:
     found = []
     if manifest.frames < task.episode_steps + 1:
         found.append(
-            f"{_too_short(manifest, task)}: import them again with --frames {task.episode_steps + 1}"
+            f"{_too_short(manifest, task)}: import them again with --frames {task.episode_steps + 1}, or pass "
+            f"--episode-steps {manifest.frames - 1} here"
         )
     environment = make_environment(task.name, PictureConfig(), task.episode_steps, task.action_repeat)
     rate = environment.metadata["render_fps"]

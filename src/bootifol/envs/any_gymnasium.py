@@ -59,6 +59,9 @@ class GymnasiumSimulator:
         self.step_seconds = ASSUMED_STEP_SECONDS if seconds is None else seconds
         self.truncated = False
         self._size = pictures.picture_size
+        # What cannot be shown is refused here, before anyone has written a file.
+        self.reset(seed=0)
+        self.render()
 
     def reset(self, seed: int) -> None:
         self.truncated = False
@@ -85,7 +88,10 @@ class GymnasiumSimulator:
         try:
             picture = self.environment.render()
         except Exception as error:  # each renderer fails with exceptions of its own
-            raise BootifolError(f"{self.name} cannot render pictures here: {_told(error)}") from error
+            raise BootifolError(
+                f"{self.name} cannot render pictures here: {_told(error)} (is a package missing, or OpenGL? "
+                "`bootifol doctor` tries the latter)"
+            ) from error
         if not (
             isinstance(picture, np.ndarray)
             and picture.dtype == np.uint8
@@ -174,13 +180,13 @@ def _registered(name: str) -> Environment:
             )
     except gymnasium.error.UnregisteredEnv as error:
         raise BootifolError(
-            f"Gymnasium has no environment '{identifier}': {_told(error)} If another package registers it, name "
-            f"that package too: {PREFIX}PACKAGE:{identifier.rpartition(':')[2]}"
+            f"Gymnasium has no environment '{identifier}' ({_told(error).rstrip('.')}); if another package registers "
+            f"it, name that package too: {PREFIX}PACKAGE:{identifier.rpartition(':')[2]}"
         ) from error
     except (ImportError, gymnasium.error.DependencyNotInstalled) as error:
         raise BootifolError(
-            f"{name} needs a package that is missing: {_told(error)}; install it (for Gymnasium's own environments: "
-            "`pip install 'bootifol[gymnasium]'`)"
+            f"{name} needs a package that is missing: {_told(error).rstrip('.')}; install it (`pip install "
+            "'bootifol[gymnasium]'` brings what Gymnasium's own classic control and MuJoCo environments need)"
         ) from error
     except TypeError as error:
         if "render_mode" in str(error):
