@@ -3,7 +3,7 @@ import pytest
 
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
-from bootifol.tasks import TASKS, make_environment, task_named
+from bootifol.tasks import TASKS, make_environment, short_name, task_named
 
 
 @pytest.mark.parametrize("task", TASKS.values(), ids=list(TASKS))
@@ -45,3 +45,8 @@ def test_an_environment_has_the_length_and_pictures_asked_for() -> None:
     assert info["video_frame"].shape == (12, 12, 3)
     ends = [environment.step(np.zeros(2, np.float32))[3] for _ in range(7)]
     assert ends == [False] * 6 + [True]
+
+
+def test_names_for_files_have_no_colons() -> None:
+    names = ("reacher_hard", "gymnasium:Pendulum-v1", "gymnasium:robot:Reach-v0", "my.robot:make")
+    assert [*map(short_name, names)] == ["reacher_hard", "Pendulum-v1", "robot.Reach-v0", "my.robot.make"]

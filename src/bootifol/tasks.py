@@ -174,8 +174,8 @@ def make_environment(
 
 
 def short_name(task_name: str) -> str:
-    """A task's name for files and titles: Pendulum-v1 of gymnasium:Pendulum-v1."""
-    return task_name.rpartition(":")[2]
+    """A task's name for files and titles: Pendulum-v1 of gymnasium:Pendulum-v1, my_robot.make of my_robot:make."""
+    return task_name.removeprefix("gymnasium:").replace(":", ".")
 
 
 @cache
