@@ -3,10 +3,10 @@
     python -m benchmarks.any_environment pendulum --out runs/pendulum --time-budget 40m
     python -m benchmarks.any_environment reacher --out runs/reacher_v5 --time-budget 40m
 
-Pendulum-v1 is Gymnasium's own and needs no MuJoCo, Reacher-v5 does; both need `pip install 'bootifol[gymnasium]'`. The
-experts below read the simulator's state. They are filmed by Gymnasium's renderer at its full size and speed, as any user
-would film theirs; from there on this script only types the commands that a user would type, and prints them. What is there
-already is not done again.
+Pendulum-v1 needs no MuJoCo, Reacher-v5 does; both need `pip install 'bootifol[gymnasium]'`. The experts below read the
+simulator's state. They are filmed by Gymnasium's renderer at its full size and speed, as any user would film theirs;
+from there on this script only types the commands that a user would type, and prints them. What is there already is not
+done again.
 """
 
 from __future__ import annotations
@@ -60,14 +60,20 @@ def swing_up(environment: Any) -> NDArray[np.float64]:
 
 
 def reach(environment: Any) -> NDArray[np.float64]:
-    """Reacher: the arm's joints are pulled along the error of its fingertip (the Jacobian's transpose), with damping."""
-    shoulder, elbow = environment.data.qpos[:2]
-    first = 0.1 * np.array([np.cos(shoulder), np.sin(shoulder)])
-    second = 0.11 * np.array([np.cos(shoulder + elbow), np.sin(shoulder + elbow)])
-    tip = first + second
-    jacobian = np.array([[-tip[1], -second[1]], [tip[0], second[0]]])
-    error = environment.get_body_com("target")[:2] - environment.get_body_com("fingertip")[:2]
-    return np.clip(60.0 * jacobian.T @ error - 0.06 * environment.data.qvel[:2], -1.0, 1.0)
+    """Reacher: both joints are pulled, as by damped springs, to the nearer of the two poses that reach the target."""
+    upper, fore = 0.1, 0.11  # lengths of the links in meters
+    angles, velocities = environment.data.qpos[:2], environment.data.qvel[:2]
+    x, y = environment.get_body_com("target")[:2]
+    cosine = (x**2 + y**2 - upper**2 - fore**2) / (2 * upper * fore)
+    bend = np.arccos(np.clip(cosine, -1.0, 1.0))
+    errors = []
+    for elbow in (bend, -bend):
+        shoulder = np.arctan2(y, x) - np.arctan2(fore * np.sin(elbow), upper + fore * np.cos(elbow))
+        turn = (shoulder - angles[0] + np.pi) % (2 * np.pi) - np.pi
+        errors.append(np.array([turn, elbow - angles[1]]))
+    error = min(errors, key=lambda candidate: float(np.abs(candidate).sum()))
+    torque: NDArray[np.float64] = np.clip(0.5 * error - 0.08 * velocities, -1.0, 1.0)
+    return torque
 
 
 EXAMPLES = {
@@ -76,8 +82,12 @@ EXAMPLES = {
 }
 
 
-def film(example: Example, directory: Path, episodes: int) -> None:
-    """Writes one mp4 an episode of the expert, every frame the environment renders; those that are there are kept."""
+def film(example: Example, directory: Path, episodes: int) -> float:
+    """Writes one mp4 an episode of the expert, with every frame; those that are there are kept.
+
+    Returns:
+        Frames per second.
+    """
     simulator = GymnasiumSimulator(f"gymnasium:{example.identifier}", PictureConfig())
     environment: gymnasium.Env[Any, Any] = simulator.environment
     returns = []
@@ -99,6 +109,7 @@ def film(example: Example, directory: Path, episodes: int) -> None:
         print(
             f"the expert returns {np.mean(returns):.1f} ± {np.std(returns):.1f} in {len(returns)} filmed episodes"
         )
+    return 1.0 / simulator.step_seconds
 
 
 def command(*words: str) -> None:
@@ -129,10 +140,9 @@ def main() -> None:
     task = f"gymnasium:{example.identifier}"
     lengths = ["--action-repeat", str(example.action_repeat), "--episode-steps", str(example.episode_steps)]
     try:
-        film(example, videos, arguments.episodes)
+        rate = film(example, videos, arguments.episodes) / example.action_repeat
     except BootifolError as error:
         sys.exit(f"error: {error}")
-    rate = float(gymnasium.spec(example.identifier).make().metadata["render_fps"]) / example.action_repeat
     if not demos.exists():
         shape = ["--fps", f"{rate:g}", "--frames", str(example.episode_steps + 1)]
         command("demos", "import", str(videos), "--out", str(demos), *shape, "--windows", "first")
