@@ -99,20 +99,24 @@ def _policy(run: RunFiles) -> Finding | None:
 
 
 def _policy_without_scale(run: RunFiles, final: FinalReturn) -> Finding:
-    """Nobody measured an expert: what can be said are successes, and random actions from a few starts."""
-    count = final.environment_return.count
-    random = [
-        video.environment_return
-        for (kind, _), video in run.showcase.items()
-        if kind == "random" and video.environment_return is not None
-    ]
-    text = f"The policy returns {number(final.environment_return.mean)} in at most {final.episode_steps} agent steps"
-    if random:
-        text += f" (random actions from {len(random)} starts, in training episodes: {number(float(np.mean(random)))})"
+    """Nobody measured an expert: what can be said are successes, and random actions from the same few starts."""
+    text = f"The policy returns {number(final.environment_return.mean)} in episodes of {final.episode_steps} agent steps"
+    returns = {
+        kind: [
+            video.environment_return
+            for (k, _), video in run.showcase.items()
+            if k == kind and video.environment_return is not None
+        ]
+        for kind in ("agent", "random")
+    }
+    if all(returns.values()):
+        agent, random = (number(float(np.mean(of_kind))) for of_kind in returns.values())
+        text += f", and in the training episodes shown below {agent} where random actions return {random}"
     if final.successes is not None:
+        count = final.environment_return.count
         verdict = _verdict(final.successes / count, good=0.8, fair=0.2)
-        return Finding(verdict, f"{text}, {final.successes} of {count} episodes solved.")
-    return Finding("fair", f"{text}; the task has no measured expert, so this has no scale.")
+        return Finding(verdict, f"{text}; {final.successes} of {count} episodes solved.")
+    return Finding("fair", f"{text}. The task has no measured expert, so there is no scale.")
 
 
 def _reward(run: RunFiles) -> Finding | None:
