@@ -100,7 +100,8 @@ def _policy(run: RunFiles) -> Finding | None:
 
 def _policy_without_scale(run: RunFiles, final: FinalReturn) -> Finding:
     """Nobody measured an expert: what can be said are successes, and random actions from the same few starts."""
-    text = f"The policy returns {number(final.environment_return.mean)} in episodes of {final.episode_steps} agent steps"
+    mean = number(final.environment_return.mean)
+    text = f"The policy returns {mean} in episodes of {final.episode_steps} agent steps"
     returns = {
         kind: [
             video.environment_return
