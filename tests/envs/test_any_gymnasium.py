@@ -154,7 +154,7 @@ def test_a_function_in_the_current_directory_makes_an_environment(
         ),
         (
             "gymnasium:Tiny/DictActions-v0",
-            "has Dict actions and bootifol acts with continuous.*FlattenAction",
+            "has Dict actions and bootifol acts with continuous.*TransformAction",
         ),
         ("gymnasium:Tiny/Unbounded-v0", "have no bounds.*finite bounds"),
         ("gymnasium:Tiny/Blind-v0", "renders no pictures.*its render modes are human"),
@@ -231,6 +231,18 @@ def test_mujoco_environments_of_gymnasium_do_not_draw_into_each_other() -> None:
     second.close()
     np.testing.assert_array_equal(first.render(), alone)
     first.close()
+
+
+@pytest.mark.parametrize("identifier", ["Tiny/DictActions-v0", "Tiny/Unbounded-v0"])
+def test_the_wrapper_that_a_refusal_names_helps(identifier: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def wrapped() -> gymnasium.Env[Any, Any]:
+        inside = gymnasium.make(identifier, render_mode="rgb_array")
+        box = gymnasium.spaces.Box(-1.0, 1.0, (1,))
+        return gymnasium.wrappers.TransformAction(inside, lambda action: {"a": action}, box)
+
+    monkeypatch.setattr(tiny_environments, "wrapped", wrapped, raising=False)
+    made = simulator("tiny_environments:wrapped")
+    assert (made.action_dim, made.time_limit) == (1, 7)
 
 
 def test_registered_environments_are_left_as_they_were() -> None:

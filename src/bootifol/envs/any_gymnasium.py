@@ -240,7 +240,7 @@ def _action_space(name: str, environment: Environment) -> gymnasium.spaces.Box:
     if isinstance(space, gymnasium.spaces.Dict | gymnasium.spaces.Tuple):
         raise BootifolError(
             f"{name} has {type(space).__name__} actions and {SUPPORTED}; wrap it with "
-            "gymnasium.wrappers.FlattenAction"
+            "gymnasium.wrappers.TransformAction"
         )
     if not isinstance(space, gymnasium.spaces.Box) or not np.issubdtype(space.dtype, np.floating):
         raise BootifolError(
@@ -249,7 +249,7 @@ def _action_space(name: str, environment: Environment) -> gymnasium.spaces.Box:
     if not (np.isfinite(space.low).all() and np.isfinite(space.high).all()):
         raise BootifolError(
             f"the actions of {name} have no bounds ({space}) and {SUPPORTED}; wrap it with "
-            "gymnasium.wrappers.RescaleAction or give its action space finite bounds"
+            "gymnasium.wrappers.TransformAction or give its action space finite bounds"
         )
     if not np.prod(space.shape):
         raise BootifolError(f"{name} has no actions ({space}) and {SUPPORTED}")
