@@ -26,6 +26,7 @@ from rich.table import Table
 
 from bootifol.agents.drqv2 import DrQv2Config
 from bootifol.envs.rollout import Act
+from bootifol.errors import BootifolError
 from bootifol.evaluation.returns import evaluate, scaled_return
 from bootifol.evaluation.summary import summarize
 from bootifol.files import written_aside
@@ -162,6 +163,10 @@ def trained(arguments: argparse.Namespace, variant: str, seed: int, directory: P
     results = evaluate(environment, act, evaluation_seeds(seed, EPISODES))
     mean = float(np.mean([result.environment_return for result in results]))
     scaled = scaled_return(mean, expert_return=task.expert_return, random_return=task.random_return)
+    if scaled is None:
+        raise BootifolError(
+            f"{task.name} has no measured returns to compare with: choose a task of the catalogue"
+        )
     return {
         "variant": variant,
         "seed": str(seed),

@@ -3,7 +3,7 @@ import pytest
 
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
-from bootifol.tasks import TASKS, make_environment, task_named
+from bootifol.tasks import TASKS, make_environment, short_name, task_named
 
 
 @pytest.mark.parametrize("task", TASKS.values(), ids=list(TASKS))
@@ -31,6 +31,17 @@ def test_an_unknown_task_is_refused_with_the_names_there_are() -> None:
         make_environment("", PictureConfig(), 1)
 
 
+def test_lengths_can_be_changed_and_returns_of_other_episodes_are_no_scale() -> None:
+    shorter = task_named("reacher_hard", episode_steps=30)
+    assert (shorter.episode_steps, shorter.evaluation_steps, shorter.expert_return) == (30, 500, 980.5)
+    coarser = task_named("reacher_hard", action_repeat=8)
+    assert (coarser.action_repeat, coarser.episode_steps, coarser.evaluation_steps) == (8, 15, 125)
+    assert coarser.expert_return is None and coarser.random_return is None
+    assert task_named("reacher_hard", evaluation_steps=100).expert_return is None
+    with pytest.raises(BootifolError, match="episode_steps must be at least 1, not 0"):
+        task_named("reacher_hard", episode_steps=0)
+
+
 def test_an_environment_has_the_length_and_pictures_asked_for() -> None:
     environment = make_environment("drawn_reach", PictureConfig(agent_size=20, video_size=12, stack=2), 7)
     observation, info = environment.reset(seed=0)
@@ -38,3 +49,8 @@ def test_an_environment_has_the_length_and_pictures_asked_for() -> None:
     assert info["video_frame"].shape == (12, 12, 3)
     ends = [environment.step(np.zeros(2, np.float32))[3] for _ in range(7)]
     assert ends == [False] * 6 + [True]
+
+
+def test_names_for_files_have_no_colons() -> None:
+    names = ("reacher_hard", "gymnasium:Pendulum-v1", "gymnasium:robot:Reach-v0", "my.robot:make")
+    assert [*map(short_name, names)] == ["reacher_hard", "Pendulum-v1", "robot.Reach-v0", "my.robot.make"]

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import TYPE_CHECKING, Literal
 
 from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.pixels import PixelEnvironment, Simulator
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, require_at_least
+
+if TYPE_CHECKING:
+    from bootifol.envs.any_gymnasium import GymnasiumSimulator
 
 
 @dataclass(frozen=True)
@@ -16,7 +21,7 @@ class Task:
     """One entry of the catalogue."""
 
     name: str
-    suite: Literal["DeepMind Control", "Meta-World", "drawn with numpy"]
+    suite: Literal["DeepMind Control", "Meta-World", "Gymnasium", "drawn with numpy"]
     description: str
     make_simulator: Callable[[PictureConfig], Simulator]
     action_repeat: int
@@ -25,9 +30,10 @@ class Task:
     """Agent steps of a training episode and of a demonstration."""
     evaluation_steps: int
     """Agent steps of an evaluation episode, on which returns are scaled."""
-    expert_return: float
-    """Measured mean over episodes of `evaluation_steps`: 1 on the scale of returns."""
-    random_return: float
+    expert_return: float | None
+    """Measured mean over episodes of `evaluation_steps`: 1 on the scale of returns. None where nobody measured it:
+    then there is no scale."""
+    random_return: float | None
     """The same for uniformly random actions: 0 on the scale."""
     has_expert: bool = True
     """Whether a scripted expert is bundled."""
@@ -135,29 +141,107 @@ TASKS = {
 }
 
 
-def task_named(name: str) -> Task:
-    """Looks a task up.
+UNLIMITED_STEPS = 200
+"""Length of an episode, in simulator steps, of a Gymnasium environment that sets no time limit."""
+
+
+def task_named(
+    name: str,
+    action_repeat: int | None = None,
+    episode_steps: int | None = None,
+    evaluation_steps: int | None = None,
+) -> Task:
+    """Looks a task up, or makes one of a Gymnasium environment.
+
+    Args:
+        name: from the catalogue, or `gymnasium:ID`, or `module:function`.
+        action_repeat: instead of the task's own; episodes then last as long in simulator steps as before.
+        episode_steps: instead of the task's own, in agent steps.
+        evaluation_steps: instead of the task's own, in agent steps.
 
     Raises:
-        BootifolError: there is none of that name.
+        BootifolError: there is none of that name, its environment cannot be used, or a length is below 1.
     """
-    if name not in TASKS:
+    if name in TASKS:
+        task = TASKS[name]
+    elif ":" in name:
+        task = _gymnasium_task(name)
+    else:
         raise BootifolError(
-            f"there is no task '{name}'; the tasks are {', '.join(TASKS)} (see `bootifol tasks`)"
+            f"there is no task '{name}'; the tasks are {', '.join(TASKS)} (see `bootifol tasks`), and any Gymnasium "
+            "environment as gymnasium:ID or MODULE:FUNCTION"
         )
-    return TASKS[name]
+    given = {
+        "action_repeat": action_repeat,
+        "episode_steps": episode_steps,
+        "evaluation_steps": evaluation_steps,
+    }
+    changes = {field: value for field, value in given.items() if value is not None}
+    if not changes:
+        return task
+    require_at_least(1, **changes)
+    repeat = changes.get("action_repeat", task.action_repeat)
+    changed = replace(
+        task,
+        action_repeat=repeat,
+        episode_steps=changes.get(
+            "episode_steps", math.ceil(task.episode_steps * task.action_repeat / repeat)
+        ),
+        evaluation_steps=changes.get(
+            "evaluation_steps", math.ceil(task.evaluation_steps * task.action_repeat / repeat)
+        ),
+    )
+    measured = (task.action_repeat, task.evaluation_steps)
+    if (changed.action_repeat, changed.evaluation_steps) != measured:
+        # The returns were measured on other episodes.
+        changed = replace(changed, expert_return=None, random_return=None)
+    return changed
 
 
-def make_environment(task_name: str, pictures: PictureConfig, episode_steps: int) -> PixelEnvironment:
+def make_environment(
+    task_name: str, pictures: PictureConfig, episode_steps: int, action_repeat: int | None = None
+) -> PixelEnvironment:
     """The environment of a task.
 
     Args:
-        task_name: from the catalogue.
+        task_name: as `task_named`.
         pictures: how it is shown.
         episode_steps: agent steps after which an episode is cut.
+        action_repeat: simulator steps an agent step; None for the task's own.
 
     Raises:
         BootifolError: unknown task, or a machine that cannot render.
     """
-    task = task_named(task_name)
+    task = task_named(task_name, action_repeat)
     return PixelEnvironment(task.make_simulator(pictures), pictures, task.action_repeat, episode_steps)
+
+
+def short_name(task_name: str) -> str:
+    """A task's name for files and titles: Pendulum-v1 of gymnasium:Pendulum-v1, my_robot.make of my_robot:make."""
+    return task_name.removeprefix("gymnasium:").replace(":", ".")
+
+
+@cache
+def _gymnasium_task(name: str) -> Task:
+    """The environment is made once to see whether it can be used, and how long its episodes are."""
+    simulator = _gymnasium_simulator(name, PictureConfig())
+    steps = simulator.time_limit or UNLIMITED_STEPS
+    simulator.close()
+    return Task(
+        name=name,
+        suite="Gymnasium",
+        description="an environment of yours; without an expert, so returns have no scale",
+        make_simulator=partial(_gymnasium_simulator, name),
+        action_repeat=1,
+        episode_steps=steps,
+        evaluation_steps=steps,
+        expert_return=None,
+        random_return=None,
+        has_expert=False,
+    )
+
+
+def _gymnasium_simulator(name: str, pictures: PictureConfig) -> GymnasiumSimulator:
+    from bootifol.envs.any_gymnasium import GymnasiumSimulator
+
+    return GymnasiumSimulator(name, pictures)

@@ -122,7 +122,7 @@ def test_tasks_measures_expert_and_random_on_evaluation_episodes(
         raise AssertionError("nobody looks at the pictures")
 
     monkeypatch.setattr(DrawnReach, "render", painted)
-    assert main(["tasks", "--task", "drawn_reach", "--measure", "3"]) == 0
+    assert main(["tasks", "drawn_reach", "--measure", "3"]) == 0
     captured = capsys.readouterr()
     assert "drawn_home" not in captured.out
     assert "drawn_reach, expert: 3/3" in captured.err
@@ -142,5 +142,5 @@ def test_tasks_measures_expert_and_random_on_evaluation_episodes(
 def test_tasks_refuses_a_negative_number_of_episodes(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tasks", "--measure", "-1"]) == 2
     assert "--measure is a number of episodes, not -1" in capsys.readouterr().err
-    assert main(["tasks", "--task", "juggling"]) == 2
+    assert main(["tasks", "juggling"]) == 2
     assert "there is no task 'juggling'" in capsys.readouterr().err

@@ -219,7 +219,7 @@ def test_unknown_names_give_a_sentence(tmp_path: Path) -> None:
 
 def test_seeds_of_videos_are_distinct_and_depend_on_both_numbers() -> None:
     def seeds(seed: int) -> set[int]:
-        plan = Recording("drawn_reach", "expert", 500, PICTURES, seed, STEPS)
+        plan = Recording("drawn_reach", "expert", 500, PICTURES, seed, STEPS, 1)
         return {plan.video_seed(index) for index in range(500)}
 
     assert len(seeds(1) | seeds(2)) == 1000

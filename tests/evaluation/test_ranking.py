@@ -7,6 +7,7 @@ from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import (
     area_under_curve,
     draw_references,
+    expert_above_random,
     margin,
     rank_videos,
     ranking_scores,
@@ -113,3 +114,13 @@ def test_references_differ_and_repeat_with_the_generator() -> None:
     assert first == [video.name for video in draw_references(model, expert, np.random.default_rng(1))]
     assert draw_references(BrightnessReward(reference_count=0), expert, np.random.default_rng(1)) == []
     assert len(draw_references(model, ListedVideos([1, 2]), np.random.default_rng(1))) == 2
+
+
+def test_expert_above_random_counts_pairs_and_needs_no_half_good_video() -> None:
+    rows = [
+        RankingRow(agent_steps=0, kind=kind, video=f"{kind}-{reward}", reward=reward)
+        for kind, reward in (("expert", 3.0), ("expert", 1.0), ("random", 2.0), ("random", 0.0))
+    ]
+    assert expert_above_random(rows) == 0.75
+    with pytest.raises(BootifolError, match="none of kind random"):
+        expert_above_random(rows[:2])

@@ -27,6 +27,11 @@ def test_each_seed_gives_one_result_in_order(monkeypatch: pytest.MonkeyPatch) ->
     assert len(set(names)) == 2
 
 
+def test_without_measured_returns_there_is_no_scale() -> None:
+    assert scaled_return(1.0, expert_return=None, random_return=0.0) is None
+    assert scaled_return(1.0, expert_return=1.0, random_return=None) is None
+
+
 def test_scaled_return_is_not_clipped() -> None:
     assert scaled_return(50.0, expert_return=100.0, random_return=0.0) == 0.5
     assert scaled_return(110.0, expert_return=100.0, random_return=10.0) == pytest.approx(100 / 90)

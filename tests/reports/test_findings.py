@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,19 @@ def test_a_run_that_learned_nothing_is_told_so(tmp_path: Path) -> None:
     run = read_run(write_synthetic_run(tmp_path / "idle", final=0.0))
     policy, _, following, showcase = findings(run)
     assert (policy.verdict, following.verdict, showcase.verdict) == ("poor", "poor", "poor")
+
+
+def test_without_an_expert_the_policy_stands_beside_random_actions(shared_run: Path) -> None:
+    run = read_run(shared_run)
+    showcase = {key: video for key, video in run.showcase.items() if key[0] != "expert"}
+    unscaled = [replace(row, scaled_return=None) for row in run.evaluations]
+    solved = findings(replace(run, evaluations=unscaled, showcase=showcase))[0]
+    assert solved.verdict == "good"
+    assert "where random actions return" in solved.text and "10 of 10 episodes solved" in solved.text
+    untold = [replace(row, success=None) for row in unscaled]
+    policy = findings(replace(run, evaluations=untold, showcase={}))[0]
+    assert policy.verdict == "fair"
+    assert "random" not in policy.text and "no scale" in policy.text
 
 
 @pytest.mark.parametrize(

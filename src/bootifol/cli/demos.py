@@ -15,13 +15,10 @@ def record(
     task: str,
     out: Path,
     episodes: int = 200,
-    behaviors: tuple[Literal["expert", "half_good", "random", "still"], ...] = (
-        "expert",
-        "random",
-        "half_good",
-    ),
+    behaviors: tuple[Literal["expert", "half_good", "random", "still"], ...] | None = None,
     seed: int = 1,
     episode_steps: int | None = None,
+    action_repeat: int | None = None,
     agent_size: int = 64,
     video_size: int = 64,
     profile: Literal["fast", "balanced", "full"] = "fast",
@@ -34,12 +31,13 @@ def record(
     no actions and no rewards. Stop it whenever you like: the same command goes on where it stopped.
 
     Args:
-        task: What to perform; `bootifol tasks` lists the names.
+        task: What to perform: a name that `bootifol tasks` lists, gymnasium:ID, or MODULE:FUNCTION.
         out: Directory of the demo sets, the one to give to `bootifol train --demos`.
         episodes: Videos of each behavior.
-        behaviors: Who performs.
+        behaviors: Who performs; by default expert, random and half_good, or random alone where no expert is bundled.
         seed: The same seed records the same videos, to the byte.
         episode_steps: Agent steps of a video; the task's training episode by default.
+        action_repeat: Simulator steps an agent step; the task's own by default. Training must use the same.
         agent_size: Height and width, in pixels, of the agent's pictures in training (the larger size is rendered).
         video_size: Height and width of the videos, in pixels.
         profile: Render quality; training must use the same. fast costs a tenth of full.
@@ -48,20 +46,25 @@ def record(
     # Imported here: the simulators would slow down every other command's help.
     from bootifol.demos.record import record_demos
     from bootifol.envs.pictures import PictureConfig
+    from bootifol.tasks import short_name
 
-    if not behaviors:
+    if behaviors == ():
         raise BootifolError("name at least one behavior, such as --behaviors expert random")
     pictures = PictureConfig(agent_size=agent_size, video_size=video_size, profile=profile)
     try:
-        recorded = record_demos(task, out, episodes, behaviors, pictures, seed, episode_steps, workers)
+        recorded = record_demos(
+            task, out, episodes, behaviors, pictures, seed, episode_steps, workers, action_repeat
+        )
         for behavior, demo_set in recorded.items():
             print(f"{out / behavior}: {_summary(demo_set.manifest)}")
     except KeyboardInterrupt:
         print("\nstopped; run the same command again and it goes on where it stopped")
         return 130
-    print(
-        f"next: bootifol demos check {out}, then bootifol train --task {task} --demos {out} --out runs/{task}"
-    )
+    if "half_good" in (behaviors or ()) and "half_good" not in recorded:
+        print(f"half_good videos were left out: no expert is bundled for {task} to be half as good as")
+    before = f"demos check {out}" if "expert" in recorded else f"demos import YOUR_VIDEOS --out {out}"
+    run = f"runs/{short_name(task)}"
+    print(f"next: bootifol {before}, then bootifol train --task {task} --demos {out} --out {run}")
     return 0
 
 
@@ -111,7 +114,12 @@ def import_(
     return 0
 
 
-def check(demos: Annotated[Path, tyro.conf.Positional], task: str | None = None) -> int:
+def check(
+    demos: Annotated[Path, tyro.conf.Positional],
+    task: str | None = None,
+    episode_steps: int | None = None,
+    action_repeat: int | None = None,
+) -> int:
     """Read every byte of recorded or imported videos and say whether they are whole and worth learning from.
 
     Exits with 0 when all is well, with 1 when the videos do not fit the task, with 2 when they are damaged.
@@ -119,13 +127,17 @@ def check(demos: Annotated[Path, tyro.conf.Positional], task: str | None = None)
     Args:
         demos: Directory of the demo sets, or one of them.
         task: Also compare with this task and say what to do about each difference.
+        episode_steps: Agent steps of an episode of the task, if training shall have others than the task's own.
+        action_repeat: Simulator steps an agent step, if training shall have others than the task's own.
     """
     from bootifol.demos.check import check_demo_set
     from bootifol.demos.demo_set import find_demo_sets
+    from bootifol.tasks import task_named
 
+    compared = None if task is None else task_named(task, action_repeat, episode_steps)
     fits = True
     for path in find_demo_sets(demos).values():
-        checked = check_demo_set(path, task)
+        checked = check_demo_set(path, compared)
         manifest = checked.manifest
         print(f"{path}: {_summary(manifest)}")
         print(

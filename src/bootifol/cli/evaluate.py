@@ -28,5 +28,6 @@ def evaluate(run: Annotated[Path, tyro.conf.Positional], episodes: int = 10, see
         f"mean return {result.summary.mean:.1f} (95 % interval {low:.1f} to {high:.1f}) over {episodes} episodes of "
         f"{result.episode_steps} agent steps"
     )
-    console.print(f"scaled return {result.scaled_return:.3f} (0: random actions, 1: the expert)")
+    if result.scaled_return is not None:
+        console.print(f"scaled return {result.scaled_return:.3f} (0: random actions, 1: the expert)")
     return 0

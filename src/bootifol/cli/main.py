@@ -39,7 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _run(_demos_commands(), words[1:], "bootifol demos", DEMOS_DESCRIPTION)
         return _run(_commands(words), words, "bootifol", DESCRIPTION)
     except BootifolError as error:
-        Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {_escaped(str(error))}")
+        # Without emoji: rich would draw one for the middle of gymnasium:robot:Reach-v0.
+        Console(stderr=True, soft_wrap=True, emoji=False).print(f"[bold red]error:[/] {_escaped(str(error))}")
         return 2
     except KeyboardInterrupt:
         Console(stderr=True).print("stopped")

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Annotated
+
+import tyro
 from rich.console import Console
 from rich.table import Table
 
@@ -9,47 +13,53 @@ from bootifol.errors import BootifolError
 from bootifol.tasks import TASKS, Task, task_named
 
 
-def tasks(measure: int = 0, task: str | None = None) -> int:
+def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure: int = 0) -> int:
     """List the tasks, the lengths of their episodes, and the returns of their expert and of random actions.
 
     Args:
+        names: Tasks to list; the whole catalogue by default. gymnasium:ID and MODULE:FUNCTION are tasks, too.
         measure: Play this many evaluation episodes (seeds 0, 1, …) of each task's expert and of random actions, and
             print their mean return, standard deviation, 95% interval, and the share of episodes that succeeded at
             any step, where the environment says so.
-        task: List and measure this task alone.
     """
     if measure < 0:
         raise BootifolError(f"--measure is a number of episodes, not {measure}")
-    listed = list(TASKS.values()) if task is None else [task_named(task)]
     catalogue = Table(
         "task", "suite", "action repeat", "steps", "evaluation steps", "expert return", "random return"
     )
-    for entry in listed:
+    listed = [task_named(name) for name in names] or list(TASKS.values())
+    for task in listed:
         catalogue.add_row(
-            entry.name,
-            entry.suite,
-            str(entry.action_repeat),
-            str(entry.episode_steps),
-            str(entry.evaluation_steps),
-            f"{entry.expert_return:g}" if entry.has_expert else "–",
-            f"{entry.random_return:g}",
+            task.name,
+            task.suite,
+            str(task.action_repeat),
+            str(task.episode_steps),
+            str(task.evaluation_steps),
+            "–" if task.expert_return is None else f"{task.expert_return:g}",
+            "–" if task.random_return is None else f"{task.random_return:g}",
         )
     for column in catalogue.columns[:2]:
         column.no_wrap = True
-    console = Console()
+    console = Console(emoji=False)
     console.print(catalogue)
-    for entry in listed:
-        console.print(f"{entry.name}: {entry.description}", highlight=False)
+    for task in listed:
+        console.print(f"{task.name}: {task.description}", highlight=False)
     console.print(
         "steps: agent steps of a training episode; the returns are means over evaluation episodes",
         style="dim",
     )
+    if not names:
+        console.print(
+            "any Gymnasium environment with continuous actions is a task, too: gymnasium:ID, or MODULE:FUNCTION",
+            style="dim",
+            highlight=False,
+        )
     if measure:
-        console.print(_measured(measure, listed))
+        console.print(_measured(listed, measure))
     return 0
 
 
-def _measured(episodes: int, listed: list[Task]) -> Table:
+def _measured(listed: Sequence[Task], episodes: int) -> Table:
     """Returns of each task's expert and of random actions, played now."""
     # Imported here: the simulators and scipy would slow down every other command's help.
     import numpy as np

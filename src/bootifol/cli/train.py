@@ -10,6 +10,7 @@ import tyro
 
 from bootifol.errors import BootifolError
 from bootifol.presets import PresetName, preset
+from bootifol.tasks import short_name
 from bootifol.training.config import TrainingConfig
 
 
@@ -37,7 +38,8 @@ def train(
 
     Args:
         config: Every setting of the preset, which the flags below change one by one.
-        task: The environment to act in; `bootifol tasks` lists them.
+        task: The environment to act in: a name that `bootifol tasks` lists, gymnasium:ID, or MODULE:FUNCTION, which
+            returns a Gymnasium environment.
         method: bootifol learns its reward from the videos; environment uses the true reward, as an upper bound.
         preset: paper: its hyperparameters to the digit. cpu: 2 cores, within 3 hours. demo: what `make demo` runs, with
             a time budget of minutes. drawn: the tasks drawn with numpy, in two minutes. smoke: every stage, in under
@@ -57,9 +59,14 @@ def train(
         continue_run(resume)
         return 0
     if demos is None or out is None:
+        videos = (
+            f"record videos with `bootifol demos record --task {task} --out demos/{task}`"
+            if ":" not in task
+            else f"import videos with `bootifol demos import YOUR_VIDEOS --out demos/{short_name(task)}`"
+        )
         raise BootifolError(
-            "train needs --demos (the videos) and --out (where to write the run), or --resume RUN to go on; record "
-            f"videos with `bootifol demos record --task {task} --out demos/{task}`"
+            "train needs --demos (the videos) and --out (where to write the run), or --resume RUN to go on; "
+            + videos
         )
     train_policy(
         task,

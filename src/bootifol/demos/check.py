@@ -10,7 +10,7 @@ from bootifol.demos.contact_sheet import write_contact_sheet
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.manifest import Manifest
 from bootifol.envs.pictures import PictureConfig
-from bootifol.tasks import Task, make_environment, task_named
+from bootifol.tasks import Task, make_environment
 
 
 @dataclass(frozen=True)
@@ -28,18 +28,16 @@ class CheckedSet:
     contact_sheet: Path
 
 
-def check_demo_set(path: Path, task: str | None = None) -> CheckedSet:
+def check_demo_set(path: Path, task: Task | None = None) -> CheckedSet:
     """Reads every byte of a demo set, compares every checksum and looks at every video.
 
     Args:
         path: directory of one demo set; `contact_sheet.png` is written into it.
-        task: name in the catalogue, to compare with.
+        task: to compare with.
 
     Raises:
-        BootifolError: unknown task, or the set is unfinished, incomplete or damaged; names the file and the videos.
+        BootifolError: the set is unfinished, incomplete or damaged; names the file and the videos.
     """
-    if task is not None:
-        task_named(task)
     demo_set = DemoSet.open(path, verify=True)
     manifest = demo_set.manifest
     by_pixels: dict[str, list[str]] = defaultdict(list)
@@ -56,7 +54,7 @@ def check_demo_set(path: Path, task: str | None = None) -> CheckedSet:
     )
 
 
-def differences(manifest: Manifest, task_name: str, pictures: PictureConfig | None = None) -> list[str]:
+def differences(manifest: Manifest, task: Task, pictures: PictureConfig | None = None) -> list[str]:
     """How videos differ from what a run of the task would see, one sentence each, with what to do about it.
 
     The reward compares the agent's pictures with these videos, so any difference that is not the agent's doing
@@ -64,10 +62,9 @@ def differences(manifest: Manifest, task_name: str, pictures: PictureConfig | No
 
     Args:
         manifest: of the demo set.
-        task_name: in the catalogue.
+        task: what the run performs.
         pictures: how the run shows the environment; None leaves sizes and render profile aside.
     """
-    task = task_named(task_name)
     if manifest.task is None:
         found = _differences_of_imported(manifest, task)
     elif manifest.task != task.name:
@@ -82,11 +79,13 @@ def _differences_of_recorded(manifest: Manifest, task: Task) -> list[str]:
     if manifest.action_repeat != task.action_repeat:
         found.append(
             f"one frame of the videos is {manifest.action_repeat} simulator steps after the other, and in "
-            f"{task.name} it is {task.action_repeat}: record them again"
+            f"{task.name} it is {task.action_repeat}: record them again with --action-repeat {task.action_repeat}, or "
+            f"pass --action-repeat {manifest.action_repeat} here"
         )
     if manifest.frames < task.episode_steps + 1:
         found.append(
-            f"{_too_short(manifest, task)}: record them again with --episode-steps {task.episode_steps}"
+            f"{_too_short(manifest, task)}: record them again with --episode-steps {task.episode_steps}, or pass "
+            f"--episode-steps {manifest.frames - 1} here"
         )
     return found
 
@@ -95,11 +94,17 @@ def _differences_of_imported(manifest: Manifest, task: Task) -> list[str]:
     found = []
     if manifest.frames < task.episode_steps + 1:
         found.append(
-            f"{_too_short(manifest, task)}: import them again with --frames {task.episode_steps + 1}"
+            f"{_too_short(manifest, task)}: import them again with --frames {task.episode_steps + 1}, or pass "
+            f"--episode-steps {manifest.frames - 1} here"
         )
-    environment = make_environment(task.name, PictureConfig(), task.episode_steps)
+    environment = make_environment(task.name, PictureConfig(), task.episode_steps, task.action_repeat)
     rate = environment.metadata["render_fps"]
-    if manifest.frames_per_second and abs(rate - manifest.frames_per_second) > 0.01 * rate:
+    environment.close()
+    if (
+        environment.knows_time
+        and manifest.frames_per_second
+        and abs(rate - manifest.frames_per_second) > 0.01 * rate
+    ):
         found.append(
             f"the videos show {manifest.frames_per_second:g} pictures a second and {task.name} shows {rate:g}, so "
             f"everything in them looks faster or slower: import them again with --fps {rate:g}"

@@ -22,7 +22,7 @@ from bootifol.demos.shards import (
     write_shard,
 )
 from bootifol.demos.video_files import TimedFrame, frame_rate, is_lerobot_dataset, stream_video
-from bootifol.envs.pictures import resize
+from bootifol.envs.pictures import centered_square
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.progress import progress
@@ -114,14 +114,6 @@ def convert(source: Source, conversion: Conversion) -> Iterator[Frames]:
             window = []
     if window and not windows:
         yield np.stack(window)
-
-
-def centered_square(frame: Frame, size: int) -> Frame:
-    """The largest centered square of a picture `[H, W, 3]`, resized to `[size, size, 3]`."""
-    height, width, _ = frame.shape
-    side = min(height, width)
-    top, left = (height - side) // 2, (width - side) // 2
-    return resize(frame[top : top + side, left : left + side], size)
 
 
 def _sources(files: Sequence[Path], camera: str | None) -> list[Source]:

@@ -14,7 +14,17 @@ from bootifol.files import read_json, write_json
 
 FORMAT = 1
 MANIFEST_NAME = "manifest.json"
-_PACKAGES = ("bootifol", "mujoco", "dm-control", "metaworld", "numpy", "pillow", "av")
+_PACKAGES = (
+    "bootifol",
+    "mujoco",
+    "dm-control",
+    "metaworld",
+    "gymnasium",
+    "pygame-ce",
+    "numpy",
+    "pillow",
+    "av",
+)
 
 
 @dataclass(frozen=True)

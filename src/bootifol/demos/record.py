@@ -57,6 +57,7 @@ class Recording:
     pictures: PictureConfig
     seed: int
     episode_steps: int
+    action_repeat: int
 
     def video_seed(self, index: int) -> int:
         """The seed of one video, below 2^31.
@@ -75,27 +76,36 @@ def record_demos(
     task: str,
     out: Path | str,
     episodes: int = 200,
-    behaviors: Sequence[Behavior] = ("expert", "random", "half_good"),
+    behaviors: Sequence[Behavior] | None = None,
     pictures: PictureConfig | None = None,
     seed: int = 1,
     episode_steps: int | None = None,
     workers: int = 1,
+    action_repeat: int | None = None,
 ) -> dict[Behavior, DemoSet]:
     """Records everything a run learns from, one demo set a behavior: `out/expert`, `out/random`, `out/half_good`.
 
     Args:
-        task: name in the catalogue of tasks.
+        task: name in the catalogue of tasks, or of a Gymnasium environment.
         out: directory of the demo sets.
         episodes: videos of each behavior (of half_good at most `HALF_GOOD_VIDEOS`).
-        behaviors: who performs.
+        behaviors: who performs; expert, random and half_good by default, or random alone where no expert is bundled.
+            half_good, which takes an expert to be half as good as, is left out where there is none.
         pictures: sizes and render profile; 64×64 of profile fast by default, as the preset `cpu` reads them.
         seed: every video's seed derives from it and the video's index.
         episode_steps: agent steps of a video; the task's training episode by default.
         workers: processes that play episodes.
+        action_repeat: simulator steps an agent step; the task's own by default.
 
     Raises:
         BootifolError: as `record`.
     """
+    has_expert = task_named(task).has_expert
+    performing: Sequence[Behavior]
+    if behaviors is None:
+        performing = ("expert", "random", "half_good") if has_expert else ("random",)
+    else:
+        performing = [behavior for behavior in behaviors if has_expert or behavior != "half_good"]
     pictures = pictures or PictureConfig(agent_size=64, video_size=64)
     return {
         behavior: record(
@@ -107,8 +117,9 @@ def record_demos(
             seed,
             episode_steps,
             workers,
+            action_repeat,
         )
-        for behavior in behaviors
+        for behavior in performing
     }
 
 
@@ -121,6 +132,7 @@ def record(
     seed: int = 1,
     episode_steps: int | None = None,
     workers: int = 1,
+    action_repeat: int | None = None,
 ) -> DemoSet:
     """Records a demo set, or goes on with one that was interrupted.
 
@@ -128,7 +140,7 @@ def record(
     appear whole or not at all, so this may be stopped at any moment.
 
     Args:
-        task: name in the catalogue of tasks.
+        task: name in the catalogue of tasks, or of a Gymnasium environment.
         behavior: "expert", "half_good", "random" or "still".
         episodes: number of videos.
         out: directory of the set.
@@ -136,6 +148,7 @@ def record(
         seed: every video's seed derives from it and the video's index.
         episode_steps: agent steps of a video (T), the task's training episode by default.
         workers: processes that play episodes; 1 plays them in this one.
+        action_repeat: simulator steps an agent step; the task's own by default.
 
     Raises:
         BootifolError: another set is there already, the disk is too small, or a name is unknown.
@@ -146,14 +159,16 @@ def record(
         raise BootifolError(
             f"there is no behavior '{behavior}'; choose among {', '.join(get_args(Behavior))}"
         )
-    if behavior in ("expert", "half_good") and not task_named(task).has_expert:
+    performed = task_named(task, action_repeat, episode_steps)
+    if behavior in ("expert", "half_good") and not performed.has_expert:
         raise BootifolError(
             f"no expert is bundled for {task}: import videos of it with `bootifol demos import`, and record "
             "the other behaviors with `--behaviors random`"
         )
     out = Path(out)
-    steps = task_named(task).episode_steps if episode_steps is None else episode_steps
-    plan = Recording(task, behavior, episodes, pictures, seed, steps)
+    plan = Recording(
+        task, behavior, episodes, pictures, seed, performed.episode_steps, performed.action_repeat
+    )
     manifest = _begin(out, plan)
     per_shard = videos_per_shard(episodes, manifest.video_bytes)
     finished = _whole_shards(out, manifest)
@@ -182,21 +197,23 @@ def record(
 
 def play(plan: Recording, index: int) -> Frames:
     """One video of the set, uint8 `[n, H, W, 3]` with `n` at most T + 1; the same in any process."""
-    environment = _environment(plan.task, plan.pictures, plan.episode_steps)
+    environment = _environment(plan.task, plan.pictures, plan.episode_steps, plan.action_repeat)
     seed = plan.video_seed(index)
     act = make_behavior(plan.behavior, plan.task, environment, seed)
     return play_episode(environment, act, seed, name="recorded").episode.video.frames
 
 
 @cache
-def _environment(task: str, pictures: PictureConfig, episode_steps: int) -> gymnasium.Env[Any, Any]:
+def _environment(
+    task: str, pictures: PictureConfig, episode_steps: int, action_repeat: int
+) -> gymnasium.Env[Any, Any]:
     """Kept until the process ends: freeing a renderer can spoil the pictures of the next one."""
-    return make_environment(task, pictures, episode_steps)
+    return make_environment(task, pictures, episode_steps, action_repeat)
 
 
 def _begin(out: Path, plan: Recording) -> Manifest:
     """The manifest to go on with: that of the recording in `out`, or a new one without videos."""
-    environment = _environment(plan.task, plan.pictures, plan.episode_steps)
+    environment = _environment(plan.task, plan.pictures, plan.episode_steps, plan.action_repeat)
     new = Manifest(
         name=f"{plan.task}-{plan.behavior}",
         complete=False,
@@ -208,7 +225,7 @@ def _begin(out: Path, plan: Recording) -> Manifest:
         video_size=plan.pictures.video_size,
         agent_size=plan.pictures.agent_size,
         render_profile=plan.pictures.profile,
-        action_repeat=task_named(plan.task).action_repeat,
+        action_repeat=plan.action_repeat,
         frames_per_second=environment.metadata["render_fps"],
         conversion=None,
         versions=installed_versions(),

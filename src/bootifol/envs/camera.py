@@ -135,17 +135,23 @@ class Camera:
             self.close()
 
 
-def load_mujoco() -> Any:
-    """The `mujoco` module; on Linux without a display it renders through EGL unless the user chose otherwise.
-
-    Raises:
-        BootifolError: MuJoCo or the OpenGL platform it was told to use cannot be imported.
-    """
+def prepare_opengl() -> None:
+    """To be called before the first OpenGL context: on Linux without a display MuJoCo renders through EGL unless
+    the user chose otherwise."""
     if torch.version.cuda is not None:
         # CUDA builds of torch import Triton with this module, which crashes once Mesa has loaded its LLVM.
         importlib.import_module("torch._dynamo")
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         os.environ.setdefault("MUJOCO_GL", "egl")
+
+
+def load_mujoco() -> Any:
+    """The `mujoco` module, ready to render.
+
+    Raises:
+        BootifolError: MuJoCo or the OpenGL platform it was told to use cannot be imported.
+    """
+    prepare_opengl()
     try:
         return importlib.import_module("mujoco")
     except Exception as error:  # each OpenGL platform fails with exceptions of its own

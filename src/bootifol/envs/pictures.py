@@ -48,6 +48,17 @@ class PictureConfig:
         return max(self.agent_size, self.video_size)
 
 
+def centered_square(picture: Frame, size: int) -> Frame:
+    """The largest centered square of a picture `[H, W, 3]`, resized to `[size, size, 3]`.
+
+    Imported videos and rendered pictures both pass through here, so that they show the same part of a scene.
+    """
+    height, width, _ = picture.shape
+    side = min(height, width)
+    top, left = (height - side) // 2, (width - side) // 2
+    return resize(picture[top : top + side, left : left + side], size)
+
+
 def resize(picture: Frame, size: int) -> Frame:
     """A picture `[H, W, 3]` at `[size, size, 3]`, each pixel the mean of the area it covers."""
     if picture.shape[:2] == (size, size):

@@ -13,7 +13,11 @@ from bootifol.types import Action, Frame, Observation
 
 
 class Simulator(Protocol):
-    """What a simulator must offer; everything about pictures, time and repetition is done here once."""
+    """What a simulator must offer; everything about pictures, time and repetition is done here once.
+
+    One that cuts episodes for reasons of its own, which are no ends to learn from, says so after a step in an attribute
+    `truncated`; one that had to assume its `step_seconds` has an attribute `knows_time`, False.
+    """
 
     action_dim: int
 
@@ -57,6 +61,8 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
         self.episode_steps = episode_steps
         self.rendered = True
         """False where nobody looks at the pictures: they are black then, and cost nothing."""
+        self.knows_time: bool = getattr(simulator, "knows_time", True)
+        """Whether the frames per second in `metadata` are the simulator's own."""
         self.metadata = {
             "render_modes": [],
             "render_fps": round(1.0 / (action_repeat * simulator.step_seconds), 6),
@@ -90,15 +96,16 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
             raise RuntimeError("the episode is over: call reset before step")
         if np.shape(action) != self.action_space.shape or not np.isfinite(action).all():
             raise ValueError(f"an action here is {self.action_space.shape} finite numbers, not {action}")
-        reward, terminated, success = 0.0, False, None
+        reward, terminated, cut, success = 0.0, False, False, None
         clipped = np.clip(action, -1.0, 1.0)
         for _ in range(self.action_repeat):
             step_reward, terminated, success = self.simulator.step(clipped)
             reward += step_reward
-            if terminated:
+            cut = getattr(self.simulator, "truncated", False)
+            if terminated or cut:
                 break
         self._agent_steps += 1
-        truncated = self._agent_steps >= self.episode_steps
+        truncated = cut or self._agent_steps >= self.episode_steps
         self._over = terminated or truncated
         info = self._look()
         if success is not None:

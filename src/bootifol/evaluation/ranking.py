@@ -118,6 +118,25 @@ def ranking_scores(rows: Sequence[RankingRow]) -> RankingScores:
     )
 
 
+EXPERT_ABOVE_RANDOM = "ranking/expert_above_random"
+"""Name of the metric of `expert_above_random`."""
+
+
+def expert_above_random(rows: Sequence[RankingRow]) -> float:
+    """AUC: the chance that an expert video is rewarded above a random one, where nobody is half as good.
+
+    Raises:
+        BootifolError: one of the two kinds has no video.
+    """
+    rewards = {
+        kind: np.array([row.reward for row in rows if row.kind == kind]) for kind in ("expert", "random")
+    }
+    for kind, of_kind in rewards.items():
+        if len(of_kind) == 0:
+            raise BootifolError(f"videos cannot be ranked: there is none of kind {kind}; add one at least")
+    return area_under_curve(rewards["expert"], rewards["random"])
+
+
 def area_under_curve(better: NDArray[np.float64], worse: NDArray[np.float64]) -> float:
     """The share of pairs in which the better one `[N]` is above the worse one `[M]`; ties count half."""
     difference = better[:, None] - worse[None, :]

@@ -45,14 +45,18 @@ def evaluate(
     return results
 
 
-def scaled_return(environment_return: float, *, expert_return: float, random_return: float) -> float:
+def scaled_return(
+    environment_return: float, *, expert_return: float | None, random_return: float | None
+) -> float | None:
     """(R - R_random) / (R_expert - R_random): 0 for a random agent, 1 for the expert, not clipped.
 
-    The three returns must come from episodes of one length.
+    The three returns must come from episodes of one length. None where the expert's or the random agent's is not known.
 
     Raises:
         BootifolError: the expert is no better than random, so there is no scale.
     """
+    if expert_return is None or random_return is None:
+        return None
     if not expert_return > random_return:
         raise BootifolError(
             f"returns cannot be scaled: the expert's return {expert_return:g} is not above the random "
@@ -88,9 +92,7 @@ def evaluation_rows(
             episode=episode,
             seed=result.seed,
             environment_return=result.environment_return,
-            scaled_return=None
-            if expert_return is None or random_return is None
-            else scaled_return(
+            scaled_return=scaled_return(
                 result.environment_return, expert_return=expert_return, random_return=random_return
             ),
             success=result.success,

@@ -79,8 +79,10 @@ def findings(run: RunFiles) -> list[Finding]:
 
 def _policy(run: RunFiles) -> Finding | None:
     final = final_return(run)
-    if final is None or final.scaled_return is None:
+    if final is None:
         return None
+    if final.scaled_return is None:
+        return _policy_without_scale(run, final)
     value = final.scaled_return.mean
     levels = run.return_levels(final.episode_steps)
     ends = "" if levels is None else f" (random {number(levels[0])}, expert {number(levels[1])})"
@@ -94,6 +96,28 @@ def _policy(run: RunFiles) -> Finding | None:
         f"{value:.0%} of the way from random to expert{solved}."
     )
     return Finding(_verdict(value, good=0.8, fair=0.2), text)
+
+
+def _policy_without_scale(run: RunFiles, final: FinalReturn) -> Finding:
+    """Nobody measured an expert: what can be said are successes, and random actions from the same few starts."""
+    mean = number(final.environment_return.mean)
+    text = f"The policy returns {mean} in episodes of {final.episode_steps} agent steps"
+    returns = {
+        kind: [
+            video.environment_return
+            for (k, _), video in run.showcase.items()
+            if k == kind and video.environment_return is not None
+        ]
+        for kind in ("agent", "random")
+    }
+    if all(returns.values()):
+        agent, random = (number(float(np.mean(of_kind))) for of_kind in returns.values())
+        text += f", and in the training episodes shown below {agent} where random actions return {random}"
+    if final.successes is not None:
+        count = final.environment_return.count
+        verdict = _verdict(final.successes / count, good=0.8, fair=0.2)
+        return Finding(verdict, f"{text}; {final.successes} of {count} episodes solved.")
+    return Finding("fair", f"{text}. The task has no measured expert, so there is no scale.")
 
 
 def _reward(run: RunFiles) -> Finding | None:

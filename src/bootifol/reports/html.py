@@ -20,6 +20,7 @@ from bootifol.reports.film_strip import KINDS, reward_above_film_strip, videos_o
 from bootifol.reports.findings import FinalReturn, Finding, final_return, findings, number, scores_or_none
 from bootifol.reports.plots import KIND_COLORS, RunLook, looks_of, svg_data_uri, thousands
 from bootifol.reports.run_files import COUNTERS, RunFiles, read_run
+from bootifol.tasks import short_name
 
 SHOWN_STARTS = 4
 """Starts shown with pictures and videos; more would make the file heavy and tell little."""
@@ -148,7 +149,12 @@ def _template_environment() -> Environment:
 
 
 def _title(runs: Sequence[RunFiles]) -> str:
-    return ", ".join(dict.fromkeys(run.task.replace("_", " ").title() for run in runs))
+    return ", ".join(dict.fromkeys(_task_title(run.task) for run in runs))
+
+
+def _task_title(task: str) -> str:
+    """Reacher Hard of reacher_hard; names with a colon are other people's and stay as they are."""
+    return short_name(task) if ":" in task else task.replace("_", " ").title()
 
 
 def _section(look: RunLook, anchor: str, alone: bool) -> RunSection:
@@ -292,9 +298,11 @@ def _card(title: str, figure: Figure | None, caption: str) -> list[Card]:
 
 def _video_rows(run: RunFiles) -> list[list[PlayedVideo]]:
     rows = []
+    # Random actions are shown only where there is no expert to compare with.
+    expert = any(kind == "expert" for kind, _ in run.video_files)
     for start in sorted({start for _, start in run.video_files})[:SHOWN_STARTS]:
         row = []
-        for kind in (kind for kind in KINDS if kind != "random"):
+        for kind in (kind for kind in KINDS if kind != "random" or not expert):
             path = run.video_files.get((kind, start))
             if path is None:
                 continue

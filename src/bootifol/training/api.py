@@ -22,7 +22,6 @@ from bootifol.evaluation.summary import Summary, summarize
 from bootifol.files import written_aside
 from bootifol.presets import preset as preset_named
 from bootifol.reports.html import report
-from bootifol.tasks import task_named
 from bootifol.training.checkpoint import load_checkpoint, newest_checkpoint
 from bootifol.training.components import (
     build_agent,
@@ -53,7 +52,7 @@ def train_policy(
     """Learns a reward from videos and trains a policy on it; writes the run's directory and its report.
 
     Args:
-        task: from the catalogue.
+        task: from the catalogue, or `gymnasium:ID`, or `module:function`.
         demos: directory of the videos.
         out: directory of the run, new or empty.
         method: bootifol, or environment for the upper bound.
@@ -107,15 +106,15 @@ class RunEvaluation:
     episodes: list[EpisodeResult]
     summary: Summary
     """Of the environment's returns."""
-    scaled_return: float
-    """0 for random actions, 1 for the expert."""
+    scaled_return: float | None
+    """0 for random actions, 1 for the expert; None where the task has no measured returns."""
     episode_steps: int
 
 
 def evaluate_run(directory: Path | str, episodes: int = 10, seed: int = 1000) -> RunEvaluation:
     """Plays a run's newest policy, without exploration, in episodes of the task's evaluation length."""
     run = RunConfig.read(Path(directory))
-    task = task_named(run.task)
+    task = run.resolved_task()
     environment = build_environment(run, task.evaluation_steps)
     agent = build_agent(run, environment)
     load_checkpoint(_newest(Path(directory)), {"agent": agent})

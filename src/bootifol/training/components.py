@@ -22,7 +22,7 @@ from bootifol.evaluation.ranking import KINDS
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.registry import make_reward_model
-from bootifol.tasks import make_environment, task_named
+from bootifol.tasks import make_environment
 from bootifol.training.checkpoint import Stateful
 from bootifol.training.demonstrations import Demonstrations
 from bootifol.training.run_config import RunConfig
@@ -66,7 +66,7 @@ class Components:
 
 def build_environment(run: RunConfig, episode_steps: int) -> gymnasium.Env[Any, Any]:
     """An environment of the run's task that shows it as the run's configuration says."""
-    return make_environment(run.task, run.training.pictures, episode_steps)
+    return make_environment(run.task, run.training.pictures, episode_steps, run.training.action_repeat)
 
 
 def build_reward_model(run: RunConfig) -> RewardModel:
@@ -119,7 +119,7 @@ def build_components(
     config, pictures = run.training, run.training.pictures
     assert isinstance(environment.action_space, gymnasium.spaces.Box)
     action_dim = environment.action_space.shape[0]
-    frames = task_named(run.task).episode_steps + 1
+    frames = run.resolved_task().episode_steps + 1
     reward_model = build_reward_model(run)
     # The upper bound has no demonstrations: it learns from true rewards, which videos do not tell.
     demonstrated = 0 if reward_model.reads_environment_reward else demonstrated_videos(run, expert)
@@ -160,9 +160,15 @@ def open_demos(run: RunConfig, console: Console) -> Demos:
     root = Path(run.demos)
     paths = find_demo_sets(root)
     if "expert" not in paths:
+        has_expert = run.resolved_task().has_expert
         raise BootifolError(
-            f"there are no expert videos in {root}: record them with "
-            f"`bootifol demos record --task {run.task} --out {root}` or import your own with `bootifol demos import`"
+            f"there are no expert videos in {root}: "
+            + (
+                f"record them with `bootifol demos record --task {run.task} --out {root}` or "
+                if has_expert
+                else ""
+            )
+            + f"import your own with `bootifol demos import YOUR_VIDEOS --out {root}`"
         )
     expert = _open(paths["expert"], run)
     if "random" not in paths:
@@ -178,6 +184,7 @@ def open_demos(run: RunConfig, console: Console) -> Demos:
             # The same seed draws the same starts, so no start tells expert from random.
             seed=run.seed if expert.manifest.seed is None else expert.manifest.seed,
             episode_steps=expert.manifest.frames - 1,
+            action_repeat=run.training.action_repeat,
         )
     held_out = min(run.training.evaluation.held_out_videos, len(expert) // 5)
     sources: dict[str, VideoSource] = {}
@@ -200,7 +207,7 @@ def reference_rng(seed: int, agent_steps: int) -> np.random.Generator:
 def _open(path: Path, run: RunConfig) -> DemoSet:
     shard_bytes = sum(file.stat().st_size for file in path.glob("*.npy"))
     demo_set = DemoSet.open(path, verify=shard_bytes < _VERIFY_BELOW_BYTES)
-    found = differences(demo_set.manifest, run.task, run.training.pictures)
+    found = differences(demo_set.manifest, run.resolved_task(), run.training.pictures)
     if found:
         raise BootifolError(f"the videos in {path} do not fit this run: {'; '.join(found)}")
     return demo_set

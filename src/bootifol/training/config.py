@@ -107,6 +107,17 @@ class TrainingConfig:
     demonstrations: DemonstrationConfig = field(default_factory=DemonstrationConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
 
+    action_repeat: int | None = None
+    """Simulator steps an agent step, instead of the task's own (1 for Gymnasium environments). Episodes then last as
+    long in simulator steps as before."""
+
+    episode_steps: int | None = None
+    """Agent steps of a training episode, instead of the task's own (for Gymnasium environments their time limit, or
+    200). The videos must be one frame longer at least."""
+
+    evaluation_steps: int | None = None
+    """Agent steps of an evaluation episode, instead of the task's own."""
+
     threads: int = 2
     """Threads PyTorch computes with."""
 

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from bootifol.errors import BootifolError
 from bootifol.files import read_json, write_json
+from bootifol.tasks import Task, task_named
 from bootifol.training.config import TrainingConfig
 
 FORMAT = 1
@@ -42,6 +43,11 @@ class RunConfig:
     time_budget: float | None
     """Seconds of wall-clock time for learning, or None for the preset's agent steps."""
     training: TrainingConfig
+
+    def resolved_task(self) -> Task:
+        """The task with the lengths that this run gives its episodes."""
+        config = self.training
+        return task_named(self.task, config.action_repeat, config.episode_steps, config.evaluation_steps)
 
     def write(self, directory: Path, command: list[str]) -> None:
         """Writes `config.json`."""

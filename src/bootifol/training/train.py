@@ -14,7 +14,13 @@ from rich.console import Console
 
 from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
-from bootifol.evaluation.ranking import KINDS, rank_videos, ranking_scores
+from bootifol.evaluation.ranking import (
+    EXPERT_ABOVE_RANDOM,
+    KINDS,
+    expert_above_random,
+    rank_videos,
+    ranking_scores,
+)
 from bootifol.evaluation.returns import evaluate, evaluation_rows
 from bootifol.evaluation.showcase import play_showcase, write_showcase
 from bootifol.evaluation.summary import summarize
@@ -22,7 +28,6 @@ from bootifol.evaluation.tables import append_evaluations, append_ranking
 from bootifol.experts import make_expert, make_random
 from bootifol.memory import keep_freed_memory
 from bootifol.progress import progress
-from bootifol.tasks import task_named
 from bootifol.tracking import Averages, Tracker
 from bootifol.training.alignment import alignment_phase
 from bootifol.training.budget import Budget, Counters, Stopwatch
@@ -60,7 +65,7 @@ class Run:
         config = self.run.training
         torch.set_num_threads(config.threads)
         keep_freed_memory()
-        self.task = task_named(self.run.task)
+        self.task = self.run.resolved_task()
         self.demos = open_demos(self.run, self.console)
         self.environment = build_environment(self.run, self.task.episode_steps)
         self.components = build_components(self.run, self.environment, self.demos.expert, self.console)
@@ -214,10 +219,13 @@ class Run:
 
     def _evaluate_while_training(self) -> None:
         config = self.run.training.evaluation
-        if config.episodes:
-            self._evaluate(self.task.episode_steps, config.episodes)
-        if config.long_episodes:
-            self._evaluate(self.task.evaluation_steps, config.long_episodes)
+        episodes = {self.task.episode_steps: config.episodes}
+        # Where both lengths are one, it is evaluated once.
+        same = episodes.get(self.task.evaluation_steps, 0)
+        episodes[self.task.evaluation_steps] = max(same, config.long_episodes)
+        for episode_steps, count in episodes.items():
+            if count:
+                self._evaluate(episode_steps, count)
 
     def _evaluate(self, episode_steps: int, episodes: int, description: str | None = None) -> Metrics:
         """Plays episodes without noise and appends them to `evaluations.csv`."""
@@ -282,6 +290,10 @@ class Run:
                 f"{scores.perfect_tau:.2f}), expert above half-good {scores.expert_above_half_good:.0%}, half-good "
                 f"above random {scores.half_good_above_random:.0%}"
             )
+        elif {"expert", "random"} <= videos.keys():
+            above = expert_above_random(rows)
+            self._log("interactive", "agent_steps", self.counters.agent_steps, {EXPERT_ABOVE_RANDOM: above})
+            self.console.print(f"the learned reward on held-out videos: expert above random {above:.0%}")
 
     def _showcase(self) -> None:
         """Expert, agent and random from the same starts, with the reward along them, for the report."""

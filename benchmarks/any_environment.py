@@ -1,0 +1,163 @@
+"""Environments that are not ours, end to end: an expert is filmed to mp4 files, and only those files are learned from.
+
+    python -m benchmarks.any_environment pendulum --out runs/pendulum --time-budget 40m
+    python -m benchmarks.any_environment reacher --out runs/reacher_v5 --time-budget 40m
+
+Pendulum-v1 needs no MuJoCo, Reacher-v5 does; both need `pip install 'bootifol[gymnasium]'`. The experts below read the
+simulator's state. They are filmed by Gymnasium's renderer at its full size and speed, as any user would film theirs;
+from there on this script only types the commands that a user would type, and prints them. What is there already is not
+done again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from bootifol.cli.main import main as bootifol
+from bootifol.demos.video_files import write_video
+from bootifol.envs.any_gymnasium import GymnasiumSimulator
+from bootifol.envs.pictures import PictureConfig
+from bootifol.errors import BootifolError
+from bootifol.progress import progress
+
+Controller = Callable[[Any], NDArray[np.float64]]
+"""The expert's action, in the environment's own units, from the environment itself."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """An environment and how to learn it."""
+
+    identifier: str
+    expert: Controller
+    action_repeat: int
+    episode_steps: int
+    """Agent steps of a training episode."""
+
+
+def swing_up(environment: Any) -> NDArray[np.float64]:
+    """Pendulum: pumps energy until the pole is nearly up, then holds it there with a spring and a damper."""
+    angle, velocity = environment.state  # 0 is upright
+    angle = (angle + np.pi) % (2 * np.pi) - np.pi
+    gravity, mass, length = environment.g, environment.m, environment.l
+    energy = mass * length**2 * velocity**2 / 6 + mass * gravity * length * (np.cos(angle) - 1) / 2
+    if abs(angle) < 0.5 and abs(velocity) < 4.0:
+        torque = -12.0 * angle - 3.0 * velocity
+    else:
+        # The energy is 0 when the pole stands still on top; at rest any push will do.
+        torque = -np.sign(energy) * environment.max_torque * (np.sign(velocity) or 1.0)
+    return np.array([np.clip(torque, -environment.max_torque, environment.max_torque)])
+
+
+def reach(environment: Any) -> NDArray[np.float64]:
+    """Reacher: both joints are pulled, as by damped springs, to the nearer of the two poses that reach the target."""
+    upper, fore = 0.1, 0.11  # lengths of the links in meters
+    angles, velocities = environment.data.qpos[:2], environment.data.qvel[:2]
+    x, y = environment.get_body_com("target")[:2]
+    cosine = (x**2 + y**2 - upper**2 - fore**2) / (2 * upper * fore)
+    bend = np.arccos(np.clip(cosine, -1.0, 1.0))
+    errors = []
+    for elbow in (bend, -bend):
+        shoulder = np.arctan2(y, x) - np.arctan2(fore * np.sin(elbow), upper + fore * np.cos(elbow))
+        turn = (shoulder - angles[0] + np.pi) % (2 * np.pi) - np.pi
+        errors.append(np.array([turn, elbow - angles[1]]))
+    error = min(errors, key=lambda candidate: float(np.abs(candidate).sum()))
+    torque: NDArray[np.float64] = np.clip(0.5 * error - 0.08 * velocities, -1.0, 1.0)
+    return torque
+
+
+EXAMPLES = {
+    "pendulum": Example("Pendulum-v1", swing_up, action_repeat=2, episode_steps=60),
+    "reacher": Example("Reacher-v5", reach, action_repeat=1, episode_steps=50),
+}
+
+
+def film(example: Example, directory: Path, episodes: int) -> float:
+    """Writes one mp4 an episode of the expert, with every frame; those that are there are kept.
+
+    Returns:
+        Frames per second.
+    """
+    simulator = GymnasiumSimulator(f"gymnasium:{example.identifier}", PictureConfig())
+    environment: gymnasium.Env[Any, Any] = simulator.environment
+    returns = []
+    with progress(f"filming the expert of {example.identifier}", episodes) as advance:
+        for number in range(episodes):
+            path = directory / f"{number:04d}.mp4"
+            if not path.exists():
+                simulator.reset(seed=10_000 + number)
+                frames, total = [np.asarray(environment.render())], 0.0
+                for _ in range(example.action_repeat * example.episode_steps + 1):
+                    _, reward, *_ = environment.step(example.expert(environment.unwrapped).astype(np.float32))
+                    total += float(reward)
+                    frames.append(np.asarray(environment.render()))
+                write_video(path, np.stack(frames), 1.0 / simulator.step_seconds)
+                returns.append(total)
+            advance()
+    simulator.close()
+    if returns:
+        print(
+            f"the expert returns {np.mean(returns):.1f} ± {np.std(returns):.1f} in {len(returns)} filmed episodes"
+        )
+    return 1.0 / simulator.step_seconds
+
+
+def command(*words: str) -> None:
+    """Types one command of bootifol.
+
+    Raises:
+        SystemExit: it failed.
+    """
+    print(f"$ bootifol {shlex.join(words)}", flush=True)
+    code = bootifol(words)
+    if code:
+        sys.exit(code)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("environment", choices=EXAMPLES)
+    parser.add_argument("--out", type=Path, required=True, help="directory for videos, demos and the run")
+    parser.add_argument("--episodes", type=int, default=200, help="expert episodes to film")
+    parser.add_argument("--preset", default="cpu")
+    parser.add_argument("--time-budget", default="40m")
+    parser.add_argument("--threads", default="1")
+    arguments = parser.parse_args()
+    example, out = EXAMPLES[arguments.environment], arguments.out
+    videos, demos, run = out / "videos", out / "demos", out / "run"
+    task = f"gymnasium:{example.identifier}"
+    lengths = ["--action-repeat", str(example.action_repeat), "--episode-steps", str(example.episode_steps)]
+    try:
+        rate = film(example, videos, arguments.episodes) / example.action_repeat
+    except BootifolError as error:
+        sys.exit(f"error: {error}")
+    if not demos.exists():
+        shape = ["--fps", f"{rate:g}", "--frames", str(example.episode_steps + 1)]
+        command("demos", "import", str(videos), "--out", str(demos), *shape, "--windows", "first")
+    command("demos", "check", str(demos), "--task", task, *lengths)
+    if (run / "config.json").exists():
+        command("train", "--resume", str(run))
+    else:
+        command(
+            *("train", "--task", task, *lengths, "--demos", str(demos), "--out", str(run)),
+            *("--preset", arguments.preset, "--time-budget", arguments.time_budget),
+            *("--threads", arguments.threads),
+        )
+    command("evaluate", str(run), "--episodes", "10")
+    command("tasks", task, "--measure", "10")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,308 @@
+"""Any Gymnasium environment with continuous actions that renders pictures, by its ID or by a function that makes it."""
+
+from __future__ import annotations
+
+import atexit
+import importlib
+import os
+import sys
+import traceback
+import warnings
+import weakref
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.wrappers import TimeLimit
+
+from bootifol.envs.camera import prepare_opengl
+from bootifol.envs.pictures import PictureConfig, centered_square
+from bootifol.errors import BootifolError
+from bootifol.types import Action, Frame
+
+PREFIX = "gymnasium:"
+"""What a name of Gymnasium's registry begins with; any other name is `module:function`."""
+
+ASSUMED_STEP_SECONDS = 1.0 / 25.0
+"""Time of a step where the environment does not tell."""
+
+SUPPORTED = "bootifol acts with continuous actions: one gymnasium.spaces.Box of floats with finite bounds"
+
+Environment = gymnasium.Env[Any, Any]
+
+_open_simulators: weakref.WeakSet[GymnasiumSimulator] = weakref.WeakSet()
+
+
+class GymnasiumSimulator:
+    """Shows an environment's `render()` as square pictures; its observations are not used.
+
+    Args:
+        name: `gymnasium:ID` or `module:function`.
+        pictures: size of the pictures; the render profile makes no difference.
+
+    Raises:
+        BootifolError: it cannot be made, acts otherwise than `SUPPORTED`, or renders no RGB pictures.
+    """
+
+    def __init__(self, name: str, pictures: PictureConfig) -> None:
+        self.name = name
+        self.environment, self.time_limit = without_time_limit(make(name))
+        """Without the environment's own time limit, which is kept here in steps (None: it has none)."""
+        space = _action_space(name, self.environment)
+        _require_pictures(name, self.environment)
+        self.action_dim = int(np.prod(space.shape))
+        self._shape, self._dtype = space.shape, space.dtype
+        self._low, self._high = space.low.astype(np.float64), space.high.astype(np.float64)
+        seconds = step_seconds(self.environment)
+        self.knows_time = seconds is not None
+        self.step_seconds = ASSUMED_STEP_SECONDS if seconds is None else seconds
+        self.truncated = False
+        self._size = pictures.picture_size
+        # What cannot be shown is refused here, before anyone has written a file.
+        self.reset(seed=0)
+        self.render()
+
+    def reset(self, seed: int) -> None:
+        self.truncated = False
+        self.environment.reset(seed=seed)
+
+    def step(self, action: Action) -> tuple[float, bool, bool | None]:
+        part = (np.asarray(action, np.float64).reshape(self._shape) + 1.0) / 2.0
+        scaled = (self._low + part * (self._high - self._low)).astype(self._dtype)
+        _, reward, terminated, truncated, info = self.environment.step(scaled)
+        self.truncated = bool(truncated)
+        success = info.get("is_success", info.get("success"))
+        return float(reward), bool(terminated), None if success is None else bool(success)
+
+    def render(self) -> Frame:
+        """The current state, uint8 `[P, P, 3]`: the largest centered square of what the environment renders.
+
+        Raises:
+            BootifolError: it renders something else than a picture, or cannot render here.
+        """
+        viewer = self._mujoco_viewer()
+        if viewer is not None:
+            # Gymnasium's MuJoCo renderers draw into whichever OpenGL context is current, be it another's.
+            viewer.make_context_current()
+        try:
+            picture = self.environment.render()
+        except Exception as error:  # each renderer fails with exceptions of its own
+            raise BootifolError(
+                f"{self.name} cannot render pictures here: {_told(error)} (is a package missing, or OpenGL? "
+                "`bootifol doctor` tries the latter)"
+            ) from error
+        if not (
+            isinstance(picture, np.ndarray)
+            and picture.dtype == np.uint8
+            and picture.ndim == 3
+            and picture.shape[2] == 3
+            and picture.size
+        ):
+            found = (
+                f"{picture.dtype} {list(picture.shape)}"
+                if isinstance(picture, np.ndarray)
+                else type(picture).__name__
+            )
+            raise BootifolError(
+                f"{self.name} renders {found} where a picture is wanted: make its render() return a uint8 array "
+                "[height, width, 3]"
+            )
+        _close_at_exit(self)
+        return centered_square(picture, self._size)
+
+    def close(self) -> None:
+        viewer = self._mujoco_viewer()
+        if viewer is not None:
+            # They also free their OpenGL context before the objects in it, which then go from another's.
+            viewer.make_context_current()
+            viewer.con.free()
+        self.environment.close()
+        _open_simulators.discard(self)
+
+    def _mujoco_viewer(self) -> Any:
+        """The renderer of Gymnasium's MuJoCo environments once it has rendered; None for all others."""
+        return getattr(getattr(self.environment.unwrapped, "mujoco_renderer", None), "viewer", None)
+
+
+def make(name: str) -> Environment:
+    """Makes an environment that renders RGB pictures.
+
+    Args:
+        name: `gymnasium:ID`, where ID may begin with a module to import first (`gymnasium:package:ID`), or
+            `module:function`, where the module may lie in the current directory.
+
+    Raises:
+        BootifolError: the name is unknown, something it needs is missing, or it makes something else.
+    """
+    _prepare_rendering()
+    if name.startswith(PREFIX):
+        return _registered(name)
+    return _made_by_function(name)
+
+
+def without_time_limit(environment: Environment) -> tuple[Environment, int | None]:
+    """The environment without `TimeLimit` wrappers, at whatever depth, and the steps of the shortest (or None)."""
+    limits = []
+    while isinstance(environment, TimeLimit):
+        limits.append(environment._max_episode_steps)
+        environment = environment.env
+    wrapper = environment
+    while isinstance(wrapper, gymnasium.Wrapper):
+        if isinstance(wrapper.env, TimeLimit):
+            limits.append(wrapper.env._max_episode_steps)
+            wrapper.env = wrapper.env.env
+        else:
+            wrapper = wrapper.env
+    return environment, min(limits, default=None)
+
+
+def step_seconds(environment: Environment) -> float | None:
+    """Time of one step, or None where the environment does not tell.
+
+    `metadata["render_fps"]` goes before `dt`, since it is the speed at which Gymnasium's own tools write videos.
+    """
+    rate = (environment.metadata or {}).get("render_fps")
+    if isinstance(rate, int | float) and rate > 0:
+        return 1.0 / float(rate)
+    seconds = getattr(environment.unwrapped, "dt", None)
+    return float(seconds) if isinstance(seconds, int | float) and seconds > 0 else None
+
+
+def _registered(name: str) -> Environment:
+    identifier = name.removeprefix(PREFIX)
+    try:
+        with warnings.catch_warnings():
+            # A missing render mode gets a sentence of its own.
+            warnings.filterwarnings("ignore", message=".*render_mode")
+            environment: Environment = gymnasium.make(
+                identifier, render_mode="rgb_array", disable_env_checker=True
+            )
+    except gymnasium.error.UnregisteredEnv as error:
+        raise BootifolError(
+            f"Gymnasium has no environment '{identifier}' ({_told(error).rstrip('.')}); if another package registers "
+            f"it, name that package too: {PREFIX}PACKAGE:{identifier.rpartition(':')[2]}"
+        ) from error
+    except (ImportError, gymnasium.error.DependencyNotInstalled) as error:
+        raise BootifolError(
+            f"{name} needs a package that is missing: {_told(error).rstrip('.')}; install it (`pip install "
+            "'bootifol[gymnasium]'` brings what Gymnasium's own classic control and MuJoCo environments need)"
+        ) from error
+    except TypeError as error:
+        if "render_mode" in str(error):
+            raise _no_pictures(name, "its constructor takes no render_mode") from error
+        raise BootifolError(f"{name} cannot be made: {_told(error)}") from error
+    except Exception as error:  # an environment may do anything when it is made
+        raise BootifolError(f"{name} cannot be made: {_told(error)}") from error
+    return environment
+
+
+def _made_by_function(name: str) -> Environment:
+    module_name, _, function_name = name.partition(":")
+    if not function_name.isidentifier() or not all(part.isidentifier() for part in module_name.split(".")):
+        raise BootifolError(
+            f"'{name}' names no environment: write {PREFIX}ID, such as {PREFIX}Pendulum-v1, or MODULE:FUNCTION, "
+            "such as my_package.my_module:make"
+        )
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        if error.name is not None and f"{module_name}.".startswith(f"{error.name}."):
+            raise BootifolError(
+                f"there is no module {error.name} for {name}, neither in {here} nor among the installed packages: "
+                "go to the directory it lies in, or install it"
+            ) from error
+        raise BootifolError(f"{name} needs a package that is missing: {_told(error)}; install it") from error
+    except Exception as error:  # a module may do anything when it is imported
+        raise BootifolError(f"{module_name} cannot be imported: {_told(error)}{_where(error)}") from error
+    function = getattr(module, function_name, None)
+    if not callable(function):
+        own = [key for key, value in vars(module).items() if _is_own_function(value, module_name)]
+        there = f"; it has {', '.join(own)}" if own else ""
+        raise BootifolError(f"the module {module_name} has no function {function_name}{there}")
+    try:
+        made = function()
+    except Exception as error:  # a function may do anything
+        raise BootifolError(f"{name} failed: {_told(error)}{_where(error)}") from error
+    if not isinstance(made, gymnasium.Env):
+        raise BootifolError(
+            f"{name} returned {type(made).__name__}, not a gymnasium.Env: return the environment itself, made with "
+            'render_mode="rgb_array"'
+        )
+    return made
+
+
+def _action_space(name: str, environment: Environment) -> gymnasium.spaces.Box:
+    space = environment.action_space
+    if isinstance(space, gymnasium.spaces.Dict | gymnasium.spaces.Tuple):
+        raise BootifolError(
+            f"{name} has {type(space).__name__} actions and {SUPPORTED}; wrap it with "
+            "gymnasium.wrappers.TransformAction"
+        )
+    if not isinstance(space, gymnasium.spaces.Box) or not np.issubdtype(space.dtype, np.floating):
+        raise BootifolError(
+            f"{name} has discrete actions ({space}) and {SUPPORTED}; choose a continuous variant"
+        )
+    if not (np.isfinite(space.low).all() and np.isfinite(space.high).all()):
+        raise BootifolError(
+            f"the actions of {name} have no bounds ({space}) and {SUPPORTED}; wrap it with "
+            "gymnasium.wrappers.TransformAction or give its action space finite bounds"
+        )
+    if not np.prod(space.shape):
+        raise BootifolError(f"{name} has no actions ({space}) and {SUPPORTED}")
+    return space
+
+
+def _require_pictures(name: str, environment: Environment) -> None:
+    modes = (environment.metadata or {}).get("render_modes") or []
+    if name.startswith(PREFIX) and "rgb_array" not in modes:
+        raise _no_pictures(name, f"its render modes are {', '.join(map(str, modes)) or 'none'}")
+    if environment.render_mode != "rgb_array":
+        raise _no_pictures(name, f"its render_mode is {environment.render_mode!r}")
+
+
+def _no_pictures(name: str, found: str) -> BootifolError:
+    return BootifolError(
+        f"{name} renders no pictures ({found}): bootifol sees what render() returns with "
+        'render_mode="rgb_array", so make the environment support that mode and with it'
+    )
+
+
+def _prepare_rendering() -> None:
+    """Lets renderers work without a display, unless the user chose otherwise; pygame prints nothing."""
+    prepare_opengl()
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    if sys.platform.startswith("linux") and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
+        os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+
+
+def _close_at_exit(simulator: GymnasiumSimulator) -> None:
+    """Called after a picture, so that our handler runs before those of the renderer (last in, first out)."""
+    if simulator not in _open_simulators:
+        _open_simulators.add(simulator)
+        atexit.unregister(_close_simulators)
+        atexit.register(_close_simulators)
+
+
+def _close_simulators() -> None:
+    for simulator in list(_open_simulators):
+        simulator.close()
+
+
+def _told(error: BaseException) -> str:
+    """What an exception says, in one line; its type where it says nothing."""
+    text = " ".join(str(error).split())
+    return text or type(error).__name__
+
+
+def _where(error: BaseException) -> str:
+    """File and line that an exception comes from."""
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f" ({type(error).__name__} in {Path(last.filename).name}, line {last.lineno})"
+
+
+def _is_own_function(value: object, module_name: str) -> bool:
+    return callable(value) and getattr(value, "__module__", None) == module_name

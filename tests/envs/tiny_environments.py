@@ -1,0 +1,110 @@
+"""Gymnasium environments that cost nothing, good ones and bad ones; registered as Tiny/…"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box, Dict, Discrete
+
+HEIGHT, WIDTH = 20, 32
+
+
+class Slide(gymnasium.Env[dict[str, Any], Any]):
+    """A white column that slides; the picture is wider than high. It ends at the right border."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
+    observation_space = Dict({"place": Box(-1.0, 1.0, (1,))})
+
+    def __init__(self, render_mode: str | None = None, cut_at: int | None = None) -> None:
+        self.render_mode = render_mode
+        self.action_space: gymnasium.Space[Any] = Box(np.float32([-1.0, 2.0]), np.float32([1.0, 6.0]))
+        self.cut_at = cut_at
+        self.place = 0.0
+        self.steps = 0
+        self.actions: list[np.ndarray] = []
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[dict[str, Any], dict[str, Any]]:
+        super().reset(seed=seed)
+        self.place = float(self.np_random.uniform(-0.9, 0.5))
+        self.steps = 0
+        return {"place": np.float32([self.place])}, {}
+
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        assert self.action_space.contains(action), action
+        self.actions.append(action)
+        self.steps += 1
+        self.place = float(np.clip(self.place + 0.1 * action[0], -1.0, 1.0))
+        ended = self.place > 0.95
+        cut = self.steps == self.cut_at
+        return {"place": np.float32([self.place])}, self.place, ended, cut, {"is_success": np.bool_(ended)}
+
+    def render(self) -> Any:
+        picture = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+        picture[:, :6] = (255, 0, 0)  # what the centered square leaves out
+        column = round(16 + 9 * self.place)
+        picture[:, column - 1 : column + 1] = 255
+        return picture
+
+
+class Other(Slide):
+    """The same with one thing changed by its arguments."""
+
+    def __init__(self, render_mode: str | None = None, **changes: Any) -> None:
+        super().__init__(render_mode)
+        for name, value in changes.items():
+            setattr(self, name, value)
+
+
+class Blind(Slide):
+    metadata = {"render_modes": ["human"], "render_fps": 20}  # noqa: RUF012
+
+
+class WithoutRenderMode(Slide):
+    def __init__(self) -> None:
+        super().__init__()
+
+
+def make() -> Slide:
+    return Slide("rgb_array")
+
+
+def make_without_time() -> Slide:
+    environment = Slide("rgb_array")
+    environment.metadata = {"render_modes": ["rgb_array"]}
+    return environment
+
+
+def make_number() -> int:
+    return 3
+
+
+def make_failing() -> Slide:
+    raise RuntimeError("no robot is plugged in")
+
+
+def make_limited_inside() -> gymnasium.Env[Any, Any]:
+    """A time limit below another wrapper, where `gymnasium.make` would not put it."""
+    return gymnasium.wrappers.OrderEnforcing(gymnasium.wrappers.TimeLimit(Slide("rgb_array"), 4))
+
+
+def register() -> None:
+    """Fills Gymnasium's registry; may be called again."""
+    for name, kind, steps, changes in (
+        ("Slide", Slide, 7, {}),
+        ("Endless", Slide, None, {}),
+        ("Cut", Slide, 50, {"cut_at": 3}),
+        ("Discrete", Other, 7, {"action_space": Discrete(3)}),
+        ("DictActions", Other, 7, {"action_space": Dict({"a": Box(-1.0, 1.0, (1,))})}),
+        ("Unbounded", Other, 7, {"action_space": Box(-np.inf, np.inf, (2,))}),
+        ("Blind", Blind, 7, {}),
+        ("WithoutRenderMode", WithoutRenderMode, 7, {}),
+        ("ManyPictures", Other, 7, {"render": lambda: [np.zeros((4, 4, 3), np.uint8)]}),
+        ("Gray", Other, 7, {"render": lambda: np.zeros((4, 4), np.uint8)}),
+    ):
+        identifier = f"Tiny/{name}-v0"
+        if identifier not in gymnasium.registry:
+            gymnasium.register(identifier, kind, max_episode_steps=steps, kwargs=changes)
+    if "Tiny/Missing-v0" not in gymnasium.registry:
+        gymnasium.register("Tiny/Missing-v0", "a_package_that_is_missing:Environment")
