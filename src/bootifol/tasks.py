@@ -39,6 +39,24 @@ def _reacher_hard(pictures: PictureConfig) -> Simulator:
     return DMControlSimulator("reacher", "hard", pictures)
 
 
+def _finger_turn_easy(pictures: PictureConfig) -> Simulator:
+    from bootifol.envs.dm_control import DMControlSimulator
+
+    return DMControlSimulator("finger", "turn_easy", pictures)
+
+
+def _hopper_stand(pictures: PictureConfig) -> Simulator:
+    from bootifol.envs.dm_control import DMControlSimulator
+
+    return DMControlSimulator("hopper", "stand", pictures)
+
+
+def _walker_run(pictures: PictureConfig) -> Simulator:
+    from bootifol.envs.dm_control import DMControlSimulator
+
+    return DMControlSimulator("walker", "run", pictures)
+
+
 def _drawn_reach(pictures: PictureConfig) -> Simulator:
     from bootifol.envs.drawn import DrawnReach
 
@@ -65,6 +83,42 @@ TASKS = {
             evaluation_steps=500,
             expert_return=980.5,
             random_return=14.1,
+        ),
+        Task(
+            name="finger_turn_easy",
+            suite="DeepMind Control",
+            description="turn a spinner with a finger until its tip lies on a large target",
+            make_simulator=_finger_turn_easy,
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=1000.0,
+            random_return=0.0,
+            has_expert=False,
+        ),
+        Task(
+            name="hopper_stand",
+            suite="DeepMind Control",
+            description="stand up on one leg and stay upright",
+            make_simulator=_hopper_stand,
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=1000.0,
+            random_return=0.0,
+            has_expert=False,
+        ),
+        Task(
+            name="walker_run",
+            suite="DeepMind Control",
+            description="run on two legs",
+            make_simulator=_walker_run,
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=1000.0,
+            random_return=0.0,
+            has_expert=False,
         ),
         Task(
             name="drawn_reach",

@@ -22,6 +22,7 @@ A first tour:
 """
 
 DEMOS_DESCRIPTION = "Make, import and check sets of videos to learn from."
+EXPERTS_DESCRIPTION = "Train who performs the tasks in recordings; those of the catalogue are bundled."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,6 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if words[:1] == ["demos"]:
             return _run(_demos_commands(), words[1:], "bootifol demos", DEMOS_DESCRIPTION)
+        if words[:1] == ["experts"]:
+            return _run(_experts_commands(), words[1:], "bootifol experts", EXPERTS_DESCRIPTION)
         return _run(_commands(words), words, "bootifol", DESCRIPTION)
     except BootifolError as error:
         Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {_escaped(str(error))}")
@@ -77,6 +80,7 @@ def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
         "evaluate": evaluate,
         "score": score,
         "report": report,
+        "experts": _experts_placeholder,
     }
 
 
@@ -84,6 +88,17 @@ def _demos_commands() -> dict[str, Callable[..., int]]:
     from bootifol.cli.demos import check, import_, record
 
     return {"record": record, "import": import_, "check": check}
+
+
+def _experts_commands() -> dict[str, Callable[..., int]]:
+    from bootifol.cli.experts import train
+
+    return {"train": train, "help": _experts_placeholder}
+
+
+def _experts_placeholder() -> int:
+    """Train an expert for recordings: experts train."""
+    return main(["experts", "--help"])
 
 
 def _demos_placeholder() -> int:
