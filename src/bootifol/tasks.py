@@ -39,10 +39,13 @@ class Task:
     """Whether a scripted expert is bundled."""
 
 
-def _reacher_hard(pictures: PictureConfig) -> Simulator:
-    from bootifol.envs.dm_control import DMControlSimulator
+def _dm_control(domain: str, name: str) -> Callable[[PictureConfig], Simulator]:
+    def make(pictures: PictureConfig) -> Simulator:
+        from bootifol.envs.dm_control import DMControlSimulator
 
-    return DMControlSimulator("reacher", "hard", pictures)
+        return DMControlSimulator(domain, name, pictures)
+
+    return make
 
 
 def _meta_world(name: str) -> Callable[[PictureConfig], Simulator]:
@@ -75,12 +78,48 @@ TASKS = {
             name="reacher_hard",
             suite="DeepMind Control",
             description="bring a two-link arm's fingertip onto a small target and keep it there",
-            make_simulator=_reacher_hard,
+            make_simulator=_dm_control("reacher", "hard"),
             action_repeat=2,
             episode_steps=60,
             evaluation_steps=500,
             expert_return=980.5,
             random_return=14.1,
+        ),
+        Task(
+            name="finger_turn_easy",
+            suite="DeepMind Control",
+            description="turn a spinner with a finger until its tip lies on a large target",
+            make_simulator=_dm_control("finger", "turn_easy"),
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=None,
+            random_return=173.4,
+            has_expert=False,
+        ),
+        Task(
+            name="hopper_stand",
+            suite="DeepMind Control",
+            description="stand up on one leg and stay upright",
+            make_simulator=_dm_control("hopper", "stand"),
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=None,
+            random_return=2.2,
+            has_expert=False,
+        ),
+        Task(
+            name="walker_run",
+            suite="DeepMind Control",
+            description="run on two legs",
+            make_simulator=_dm_control("walker", "run"),
+            action_repeat=2,
+            episode_steps=60,
+            evaluation_steps=500,
+            expert_return=None,
+            random_return=24.8,
+            has_expert=False,
         ),
         Task(
             name="button_press",

@@ -109,7 +109,7 @@ def test_tasks_prints_the_catalogue(capsys: pytest.CaptureFixture[str]) -> None:
             str(task.action_repeat),
             str(task.episode_steps),
             str(task.evaluation_steps),
-            f"{task.expert_return:g}",
+            "–" if task.expert_return is None else f"{task.expert_return:g}",
             f"{task.random_return:g}",
         ]
         assert f"{task.name}: {task.description}" in printed

@@ -17,7 +17,8 @@ def fingerprints(another_episode_first: bool) -> list[str]:
         if another_episode_first:
             play_episode(environment, make_behavior("random", task, environment, 8), 8, "another")
         for seed in (2**31 - 1, 0):
-            act = make_behavior("half_good", task, environment, seed)
+            who = "half_good" if TASKS[task].has_expert else "random"
+            act = make_behavior(who, task, environment, seed)
             played = play_episode(environment, act, seed, "episode")
             episode = played.episode
             parts = (episode.frames.tobytes(), episode.video.frames.tobytes(), episode.actions.tobytes())

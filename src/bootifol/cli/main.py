@@ -22,6 +22,7 @@ A first tour:
 """
 
 DEMOS_DESCRIPTION = "Make, import, check and export sets of videos to learn from."
+EXPERTS_DESCRIPTION = "Train who performs a task in recordings, where none is bundled."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,6 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if words[:1] == ["demos"]:
             return _run(_demos_commands(), words[1:], "bootifol demos", DEMOS_DESCRIPTION)
+        if words[:1] == ["experts"]:
+            return _run(_experts_commands(), words[1:], "bootifol experts", EXPERTS_DESCRIPTION)
         return _run(_commands(words), words, "bootifol", DESCRIPTION)
     except BootifolError as error:
         # Without emoji: rich would draw one for the middle of gymnasium:robot:Reach-v0.
@@ -78,6 +81,7 @@ def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
         "evaluate": evaluate,
         "score": score,
         "report": report,
+        "experts": _experts_placeholder,
     }
 
 
@@ -85,6 +89,17 @@ def _demos_commands() -> dict[str, Callable[..., int]]:
     from bootifol.cli.demos import check, export, import_, record
 
     return {"record": record, "import": import_, "check": check, "export": export}
+
+
+def _experts_commands() -> dict[str, Callable[..., int]]:
+    from bootifol.cli.experts import train
+
+    return {"train": train}
+
+
+def _experts_placeholder() -> int:
+    """Train an expert for recordings: experts train."""
+    return main(["experts", "--help"])
 
 
 def _demos_placeholder() -> int:

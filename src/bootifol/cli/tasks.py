@@ -24,9 +24,7 @@ def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure:
     """
     if measure < 0:
         raise BootifolError(f"--measure is a number of episodes, not {measure}")
-    catalogue = Table(
-        "task", "suite", "action repeat", "steps", "evaluation steps", "expert return", "random return"
-    )
+    catalogue = Table("task", "suite", "repeat", "steps", "evaluated", "expert", "random")
     listed = [task_named(name) for name in names] or list(TASKS.values())
     for task in listed:
         catalogue.add_row(
@@ -45,7 +43,8 @@ def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure:
     for task in listed:
         console.print(f"{task.name}: {task.description}", highlight=False)
     console.print(
-        "steps: agent steps of a training episode; the returns are means over evaluation episodes",
+        "repeat: simulator steps an agent step; steps, evaluated: agent steps of a training and an evaluation episode; "
+        "expert, random: mean returns of evaluation episodes",
         style="dim",
     )
     if not names:

@@ -6,6 +6,7 @@ import importlib
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bootifol.envs.camera import Camera, load_mujoco, no_rendering
 from bootifol.envs.pictures import PictureConfig
@@ -36,8 +37,8 @@ class DMControlSimulator:
         self.action_dim = int(np.prod(specification.shape))
         self.step_seconds = float(self.environment.control_timestep())
         self._low, self._high = specification.minimum, specification.maximum
-        # The suite's own pixels wrapper films every task with its first camera, too.
-        self._camera = Camera(self.physics.model.ptr, pictures.picture_size, pictures.profile, camera=0)
+        self._pictures = pictures
+        self._camera: Camera | None = None
 
     @property
     def physics(self) -> Any:
@@ -54,8 +55,19 @@ class DMControlSimulator:
         step = self.environment.step(scaled)
         return float(step.reward or 0.0), bool(step.last()), None
 
+    def state(self) -> NDArray[np.float32]:
+        """What the suite shows an agent that does not see: positions, velocities and the like, `[S]`."""
+        parts = self.environment.task.get_observation(self.physics).values()
+        flat: NDArray[np.float32] = np.concatenate([np.ravel(part) for part in parts]).astype(np.float32)
+        return flat
+
     def render(self) -> Frame:
+        if self._camera is None:
+            # The suite's own pixels wrapper films every task with its first camera, too.
+            size, profile = self._pictures.picture_size, self._pictures.profile
+            self._camera = Camera(self.physics.model.ptr, size, profile, camera=0)
         return self._camera.picture(self.physics.data.ptr)
 
     def close(self) -> None:
-        self._camera.close()
+        if self._camera is not None:
+            self._camera.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -19,7 +20,11 @@ from bootifol.experts.behaviors import (
     no_actions,
     random_actions,
 )
+from bootifol.experts.policy import StatePolicy
 from bootifol.types import Action
+
+BUNDLED = Path(__file__).parent / "bundled"
+"""Where `<task>.safetensors` lies for every task whose expert was trained; beside it its curve and settings."""
 
 __all__ = ["Behavior", "make_behavior", "make_expert", "make_random"]
 
@@ -62,9 +67,13 @@ def make_behavior(behavior: Behavior, task_name: str, environment: gymnasium.Env
     )
 
 
-def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Controller, WrongGoal]:
-    """A task's scripted controller, and how to draw a wrong goal for it."""
+def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Controller, WrongGoal | None]:
+    """A task's scripted or bundled controller, and how to draw a wrong goal for it, if it can have another."""
     simulator: Any = environment.unwrapped.simulator  # type: ignore[attr-defined]
+    bundled = BUNDLED / f"{task_name}.safetensors"
+    if bundled.exists():
+        policy = StatePolicy.load(bundled)
+        return lambda goal: policy(simulator.state()), None
     if task_name == "reacher_hard":
         physics = simulator.physics
 

@@ -26,13 +26,14 @@ class HalfGood:
 
     - the expert until a third of the episode, then random actions;
     - random actions three steps of four, the expert's in between;
-    - a steady reach to a wrong place.
+    - a steady reach to a wrong place, or, of an expert that knows only the task's own goal, its actions at a
+      third of their strength.
 
     Args:
         controller: the task's expert.
         environment: what it acts in.
         seed: of the kinds and of the noise.
-        wrong_goal: draws a wrong place; called once, at the first step.
+        wrong_goal: draws a wrong place, called once, at the first step; None if there is no other goal.
     """
 
     def __init__(
@@ -40,7 +41,7 @@ class HalfGood:
         controller: Controller,
         environment: gymnasium.Env[Any, Any],
         seed: int,
-        wrong_goal: WrongGoal,
+        wrong_goal: WrongGoal | None,
     ) -> None:
         self._controller = controller
         self._steps_of_an_episode: int = environment.unwrapped.episode_steps  # type: ignore[attr-defined]
@@ -53,7 +54,7 @@ class HalfGood:
 
     def __call__(self, observation: Observation) -> Action:
         """One action; the observation is not needed."""
-        if self._step == 0:
+        if self._step == 0 and self._wrong_goal is not None:
             # Only now does the simulator show this episode's start.
             self._goal = self._wrong_goal(self._rng)
         self._step += 1
@@ -62,6 +63,9 @@ class HalfGood:
             return self._controller(None) if self._step <= self._steps_of_an_episode // 3 else noise
         if self._kind == 1:
             return noise if self._rng.random() < 0.75 else self._controller(None)
+        if self._goal is None:
+            weak: Action = self._controller(None) * np.float32(1 / 3)
+            return weak
         return self._controller(self._goal)
 
 

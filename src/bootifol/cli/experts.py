@@ -1,0 +1,52 @@
+"""`bootifol experts train`: who performs where no script can."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+
+def train(
+    task: str,
+    out: Path | None = None,
+    algorithm: Literal["SAC", "TQC", "CrossQ"] = "SAC",
+    agent_steps: int = 500_000,
+    seed: int = 1,
+    learning_rate: float = 3e-4,
+    discount: float = 0.99,
+    threads: int = 1,
+) -> int:
+    """Train an expert from the simulator's states and its reward, to perform the task for recordings.
+
+    Needs the extra `experts` (stable-baselines3). Stop it whenever you like: the same command goes on from its last
+    evaluation.
+
+    Args:
+        task: What to learn; `bootifol tasks` lists the names.
+        out: Directory for the policy, its curve and its checkpoint; experts/TASK by default.
+        algorithm: Of stable-baselines3 and sb3-contrib.
+        agent_steps: How long to train.
+        seed: Of everything random.
+        learning_rate: Of Adam.
+        discount: Of future rewards, an agent step.
+        threads: Threads PyTorch computes with.
+    """
+    from bootifol.experts.train import ExpertConfig, train_expert
+
+    out = out or Path("experts") / task
+    config = ExpertConfig(
+        task=task,
+        algorithm=algorithm,
+        agent_steps=agent_steps,
+        seed=seed,
+        learning_rate=learning_rate,
+        discount=discount,
+        threads=threads,
+    )
+    try:
+        train_expert(config, out)
+    except KeyboardInterrupt:
+        print("\nstopped; run the same command again and it goes on from its last evaluation")
+        return 130
+    print(f"{out / 'expert.safetensors'}: the best policy of those in {out / 'curve.csv'}")
+    return 0

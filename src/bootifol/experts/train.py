@@ -1,0 +1,252 @@
+"""Experts trained from states with stable-baselines3: `bootifol experts train`. Needs the extra `experts`.
+
+This is the only place that learns from the environment's reward besides the `environment` method: it makes the
+performers of demonstrations, and nothing that learns from videos sees more of it than their pictures.
+"""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from bootifol.errors import BootifolError, require_at_least
+from bootifol.experts.policy import Layer, StatePolicy
+from bootifol.experts.states import StateEnvironment
+from bootifol.files import read_arrays, read_json, write_arrays, write_json, written_aside
+from bootifol.progress import progress
+from bootifol.tasks import task_named
+from bootifol.types import Arrays
+
+Algorithm = Literal["SAC", "TQC", "CrossQ"]
+
+EVALUATION_SEED = 10**6
+"""Seeds of evaluation starts begin here, so that they are none of `bootifol tasks --measure`."""
+
+COLUMNS = ("agent_steps", "seconds", "mean_return", "lowest_return")
+
+
+@dataclass(frozen=True)
+class ExpertConfig:
+    """How an expert is trained; what is not here is the library's default."""
+
+    task: str
+    algorithm: Algorithm = "SAC"
+    hidden_dims: tuple[int, ...] = (256, 256)
+    """Widths of the hidden layers, of actor and critics."""
+    agent_steps: int = 500_000
+    seed: int = 1
+    discount: float = 0.99
+    learning_rate: float = 3e-4
+    evaluation_every: int = 10_000
+    """Agent steps between two evaluations; each also writes a checkpoint."""
+    evaluation_episodes: int = 10
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        counts = ("agent_steps", "evaluation_every", "evaluation_episodes", "threads")
+        require_at_least(1, **{f"experts {name}": getattr(self, name) for name in counts})
+
+
+def train_expert(config: ExpertConfig, out: Path) -> StatePolicy:
+    """Trains an expert and keeps the best policy that an evaluation saw.
+
+    In `out`: `expert.safetensors` (the policy), `curve.csv` (an evaluation a row), `training.json` (configuration and
+    versions), `checkpoint/` (with which the same call goes on).
+
+    Raises:
+        BootifolError: stable-baselines3 is missing, or `out` holds the training of another expert.
+    """
+    torch.set_num_threads(config.threads)
+    _check_same(config, out)
+    steps = task_named(config.task).evaluation_steps
+    environment, judged = (StateEnvironment(config.task, steps) for _ in range(2))
+    model = _make_model(config, environment)
+    rows = _read_rows(out / "curve.csv")
+    if (out / "checkpoint").is_dir():
+        _load_checkpoint(out / "checkpoint", model)
+    rows = [row for row in rows if int(row["agent_steps"]) <= model.num_timesteps]
+    best = max((float(row["mean_return"]) for row in rows), default=-np.inf)
+    seconds = float(rows[-1]["seconds"]) if rows else 0.0
+    with progress(f"training an expert in {config.task}", config.agent_steps, model.num_timesteps) as advance:
+        while (done := model.num_timesteps) < config.agent_steps:
+            started = time.monotonic()
+            model.learn(
+                min(config.evaluation_every, config.agent_steps - done),
+                reset_num_timesteps=False,
+                progress_bar=False,
+            )
+            seconds += time.monotonic() - started
+            policy = extract_policy(model.actor)
+            returns = evaluate_policy(policy, judged, config.evaluation_episodes)
+            rows.append(
+                {
+                    "agent_steps": str(model.num_timesteps),
+                    "seconds": f"{seconds:.0f}",
+                    "mean_return": f"{np.mean(returns):.2f}",
+                    "lowest_return": f"{np.min(returns):.2f}",
+                }
+            )
+            if np.mean(returns) > best:
+                best = float(np.mean(returns))
+                policy.save(out / "expert.safetensors")
+            _write_rows(out / "curve.csv", rows)
+            _save_checkpoint(out / "checkpoint", model)
+            advance(model.num_timesteps - done, mean_return=float(np.mean(returns)), best=best)
+    return StatePolicy.load(out / "expert.safetensors")
+
+
+def evaluate_policy(policy: StatePolicy, environment: StateEnvironment, episodes: int) -> list[float]:
+    """Returns of so many episodes from fixed starts."""
+    returns = []
+    for number in range(episodes):
+        state, _ = environment.reset(seed=EVALUATION_SEED + number)
+        total, over = 0.0, False
+        while not over:
+            state, reward, terminated, truncated, _ = environment.step(policy(state))
+            total += reward
+            over = terminated or truncated
+        returns.append(total)
+    return returns
+
+
+def extract_policy(actor: Any) -> StatePolicy:
+    """The mean action of a stable-baselines3 actor as plain layers; batch normalization is folded into them."""
+    layers: list[Layer] = []
+    scale: np.ndarray | None = None
+    shift: np.ndarray | None = None
+    for module in [*actor.latent_pi, actor.mu]:
+        if isinstance(module, nn.Linear):
+            weight, bias = _numpy(module.weight), _numpy(module.bias)
+            if scale is not None and shift is not None:
+                weight, bias = weight * scale, bias + weight @ shift
+            layers.append((weight, bias))
+            scale = shift = None
+        elif hasattr(module, "ra_mean"):
+            scale = _numpy(module.scale) / np.sqrt(_numpy(module.ra_var) + module.eps)
+            shift = _numpy(module.bias) - _numpy(module.ra_mean) * scale
+        elif not isinstance(module, nn.ReLU | nn.Flatten):
+            raise TypeError(f"an expert's network may hold linear layers and ReLUs, not {module}")
+    return StatePolicy(layers)
+
+
+def _make_model(config: ExpertConfig, environment: StateEnvironment) -> Any:
+    try:
+        package = importlib.import_module("stable_baselines3" if config.algorithm == "SAC" else "sb3_contrib")
+    except ImportError as error:
+        raise BootifolError(
+            f"training an expert needs stable-baselines3 and sb3-contrib ({error}): "
+            "pip install 'bootifol[experts]'"
+        ) from error
+    return getattr(package, config.algorithm)(
+        "MlpPolicy",
+        environment,
+        policy_kwargs={"net_arch": list(config.hidden_dims)},
+        learning_rate=config.learning_rate,
+        gamma=config.discount,
+        buffer_size=config.agent_steps,
+        learning_starts=min(5000, config.agent_steps // 10),
+        seed=config.seed,
+        device="cpu",
+    )
+
+
+def _check_same(config: ExpertConfig, out: Path) -> None:
+    """Writes `training.json`, or compares with the one that is there; `agent_steps` and `threads` may change."""
+    path = out / "training.json"
+    now: dict[str, Any] = asdict(config) | {"hidden_dims": list(config.hidden_dims)}
+    if path.exists():
+        before = read_json(path, "the expert's training")["config"]
+        changed = [
+            name for name in now if name not in ("agent_steps", "threads") and before.get(name) != now[name]
+        ]
+        if changed:
+            raise BootifolError(
+                f"{out} holds the training of another expert (different: {', '.join(changed)}): choose "
+                "another directory, or the same settings to go on with it"
+            )
+    versions = {
+        name: importlib.import_module(name).__version__ for name in ("torch", "gymnasium", "mujoco", "numpy")
+    }
+    write_json(path, {"config": now, "versions": versions})
+
+
+def _save_checkpoint(directory: Path, model: Any) -> None:
+    arrays: Arrays = {}
+    for name, state in model.get_parameters().items():
+        if name.endswith("optimizer"):
+            for index, values in state["state"].items():
+                arrays |= {f"{name}/{index}/{key}": _array(value) for key, value in values.items()}
+        else:
+            arrays |= {f"{name}/{key}": _array(value) for key, value in state.items()}
+    arrays["log_ent_coef"] = _array(model.log_ent_coef)
+    buffer = model.replay_buffer
+    filled = buffer.buffer_size if buffer.full else buffer.pos
+    for name in ("observations", "next_observations", "actions", "rewards", "dones", "timeouts"):
+        arrays[f"replay/{name}"] = getattr(buffer, name)[:filled]
+    with written_aside(directory) as aside:
+        aside.mkdir()
+        write_arrays(aside / "arrays.safetensors", arrays)
+        counts = {
+            "num_timesteps": model.num_timesteps,
+            "updates": model._n_updates,
+            "replay": int(buffer.pos),
+        }
+        write_json(aside / "counts.json", counts)
+
+
+def _load_checkpoint(directory: Path, model: Any) -> None:
+    arrays = read_arrays(directory / "arrays.safetensors", "the expert's checkpoint")
+    counts = read_json(directory / "counts.json", "the expert's checkpoint")
+    parameters = model.get_parameters()
+    for name, state in parameters.items():
+        found = {
+            key.removeprefix(f"{name}/"): torch.from_numpy(array)
+            for key, array in arrays.items()
+            if key.startswith(f"{name}/")
+        }
+        if name.endswith("optimizer"):
+            state["state"] = {}
+            for key, value in found.items():
+                index, _, part = key.partition("/")
+                state["state"].setdefault(int(index), {})[part] = value
+        else:
+            parameters[name] = found
+    model.set_parameters(parameters, exact_match=False)
+    with torch.no_grad():
+        model.log_ent_coef.copy_(torch.from_numpy(arrays["log_ent_coef"]))
+    buffer = model.replay_buffer
+    for name in ("observations", "next_observations", "actions", "rewards", "dones", "timeouts"):
+        stored = arrays[f"replay/{name}"]
+        getattr(buffer, name)[: len(stored)] = stored
+    buffer.pos, buffer.full = counts["replay"], len(arrays["replay/rewards"]) == buffer.buffer_size
+    model.num_timesteps, model._n_updates = counts["num_timesteps"], counts["updates"]
+
+
+def _read_rows(path: Path) -> list[dict[str, str]]:
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def _write_rows(path: Path, rows: list[dict[str, str]]) -> None:
+    with written_aside(path) as aside, aside.open("w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _numpy(tensor: Tensor) -> np.ndarray:
+    return tensor.detach().cpu().double().numpy()
+
+
+def _array(value: Any) -> np.ndarray:
+    return torch.as_tensor(value).detach().cpu().numpy().copy()

@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from bootifol.errors import BootifolError
+from bootifol.experts.policy import StatePolicy
+from bootifol.experts.states import StateEnvironment
+from bootifol.experts.train import ExpertConfig, extract_policy, train_expert
+from bootifol.tasks import TASKS
+
+pytest.importorskip("sb3_contrib")
+
+CONFIG = ExpertConfig(
+    "reacher_hard", hidden_dims=(8, 8), agent_steps=60, evaluation_every=30, evaluation_episodes=1
+)
+
+
+@pytest.fixture
+def short_episodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(TASKS, "reacher_hard", replace(TASKS["reacher_hard"], evaluation_steps=20))
+
+
+@pytest.mark.parametrize("algorithm", ["SAC", "CrossQ"])
+def test_the_bundled_network_acts_like_the_trained_one(algorithm: str) -> None:
+    import sb3_contrib
+    import stable_baselines3
+
+    environment = StateEnvironment("reacher_hard", 20)
+    package: Any = stable_baselines3 if algorithm == "SAC" else sb3_contrib
+    model = getattr(package, algorithm)(
+        "MlpPolicy", environment, policy_kwargs={"net_arch": [16, 16]}, learning_starts=10, seed=0
+    )
+    model.learn(60)
+    policy = extract_policy(model.actor)
+    state, _ = environment.reset(seed=3)
+    for _ in range(5):
+        expected, _ = model.predict(state, deterministic=True)
+        np.testing.assert_allclose(policy(state), expected, atol=1e-5)
+        state, *_ = environment.step(expected)
+
+
+def test_a_policy_survives_its_file_exactly(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    layers = [
+        (rng.normal(size=shape).astype(np.float32), rng.normal(size=shape[0]).astype(np.float32))
+        for shape in ((5, 3), (2, 5))
+    ]
+    policy = StatePolicy(layers)
+    policy.save(tmp_path / "expert.safetensors")
+    state = rng.normal(size=3)
+    np.testing.assert_array_equal(StatePolicy.load(tmp_path / "expert.safetensors")(state), policy(state))
+    hidden = np.maximum(layers[0][0].astype(float) @ state + layers[0][1], 0)
+    expected = np.tanh(layers[1][0].astype(float) @ hidden + layers[1][1])
+    np.testing.assert_allclose(policy(state), expected, rtol=1e-6)
+
+
+@pytest.mark.usefixtures("short_episodes")
+def test_training_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    torch.manual_seed(0)
+    train_expert(replace(CONFIG, agent_steps=30), tmp_path / "run")
+    train_expert(CONFIG, tmp_path / "run")
+    with (tmp_path / "run" / "curve.csv").open(newline="") as file:
+        assert [row["agent_steps"] for row in csv.DictReader(file)] == ["30", "60"]
+    assert (tmp_path / "run" / "expert.safetensors").exists()
+    with pytest.raises(BootifolError, match=r"another expert \(different: seed\)"):
+        train_expert(replace(CONFIG, seed=2), tmp_path / "run")
+
+
+def test_states_and_pictures_start_alike() -> None:
+    states = StateEnvironment("reacher_hard", 20)
+    first, _ = states.reset(seed=7)
+    again, _ = states.reset(seed=7)
+    other, _ = states.reset(seed=8)
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_a_task_without_states_gets_a_sentence() -> None:
+    with pytest.raises(BootifolError, match="has no states"):
+        StateEnvironment("drawn_home", 20)
