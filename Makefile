@@ -7,14 +7,20 @@ SOURCES := src tests benchmarks
 
 .PHONY: demo test check format bench setup clean
 
-setup: .venv/ready
+setup: .venv/complete
 
+# What the demo needs.
 .venv/ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable .
 	bash scripts/opengl.sh $(BIN)/python
 	touch .venv/ready
+
+# Also every extra, linters and tests.
+.venv/complete: .venv/ready
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch .venv/complete
 
 # Expert videos in, a reward, a policy and a report out: about 14 minutes on 2 cores.
 demo: .venv/ready
@@ -31,16 +37,16 @@ demo: .venv/ready
 test: check
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
-check: .venv/ready
+check: .venv/complete
 	$(BIN)/ruff check $(SOURCES)
 	$(BIN)/ruff format --check $(SOURCES)
 	$(BIN)/mypy
 
-format: .venv/ready
+format: .venv/complete
 	$(BIN)/ruff check --fix $(SOURCES)
 	$(BIN)/ruff format $(SOURCES)
 
-bench: .venv/ready
+bench: .venv/complete
 	$(BIN)/python -m benchmarks.engine
 
 clean:
