@@ -73,9 +73,7 @@ DEMO = replace(
     agent=replace(CPU.agent, replay_capacity=20_000),
     alignment=AlignmentConfig(gradient_steps=500, time_share=0.25),
     interactive=replace(CPU.interactive, agent_videos=300),
-    demonstrations=replace(
-        CPU.demonstrations, inverse_dynamics_updates=1000, cloning_updates=2500, repeat_until=8000
-    ),
+    demonstrations=replace(CPU.demonstrations, inverse_dynamics_updates=1000, cloning_updates=2500, phases=2),
     evaluation=EvaluationConfig(every=2500, long_episodes=1, final_episodes=10),
     checkpoint_minutes=5.0,
 )
@@ -128,7 +126,7 @@ SMOKE = replace(
     alignment=AlignmentConfig(gradient_steps=60, log_every=5),
     interactive=InteractiveConfig(agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150),
     demonstrations=replace(
-        CPU.demonstrations, videos=20, inverse_dynamics_updates=30, cloning_updates=30, repeat_until=0
+        CPU.demonstrations, videos=20, inverse_dynamics_updates=30, cloning_updates=30, phases=1
     ),
     evaluation=EvaluationConfig(
         every=450, episodes=1, long_episodes=1, final_episodes=2, held_out_videos=6, showcase_episodes=2

@@ -13,7 +13,8 @@ from tiny_runs import WITH_DEMONSTRATIONS, new_run
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.errors import BootifolError
 from bootifol.replay.buffer import ReplayBuffer
-from bootifol.training.cloning import one_cycle
+from bootifol.training.budget import Budget, Counters
+from bootifol.training.cloning import cloning_due, one_cycle
 from bootifol.training.demonstrations import DemonstrationConfig, Demonstrations
 from bootifol.types import Arrays, Episode, FrameBatch, Frames, Metrics, Video, VideoSource
 
@@ -151,11 +152,10 @@ def test_pictures_are_not_saved_twice() -> None:
 
 def test_cloning_phases_come_when_they_are_due(tmp_path: Path, demos: Path) -> None:
     """60 steps of warm-up, then one phase, and another each 60 agent steps with half as many gradient steps: at 120
-    and 180, and none after `repeat_until`."""
+    and 180, and no fourth."""
     config = replace(
         WITH_DEMONSTRATIONS, interactive=replace(WITH_DEMONSTRATIONS.interactive, agent_steps=300)
     )
-    config = replace(config, demonstrations=replace(config.demonstrations, repeat_until=200))
     run = new_run(tmp_path / "run", demos, config=config)
     assert run.learn()
     counters = run.counters
@@ -200,3 +200,27 @@ def test_warm_up_actions_are_held(tmp_path: Path, demos: Path) -> None:
 def test_mistakes_are_sentences(field: str, value: float) -> None:
     with pytest.raises(BootifolError, match=field):
         DemonstrationConfig(**{field: value})  # type: ignore[arg-type]
+
+
+def test_a_cloning_phase_that_time_would_cut_off_does_not_begin() -> None:
+    demonstrations = make_demonstrations(replace(CONFIG, phases=2, repeat_every=60))
+    steps = {
+        "inverse_dynamics_updates": CONFIG.inverse_dynamics_updates,
+        "inferred_videos": len(demonstrations),
+        "cloning_updates": CONFIG.cloning_updates,
+    }
+    counters = Counters(
+        agent_steps=120,
+        cloning_phases=1,
+        cloning_began_at=60,
+        cloning_seconds=30.0,
+        interactive_seconds=10.0,
+        **steps,
+    )
+    assert cloning_due(demonstrations, counters, Budget(agent_steps=1000))
+    assert cloning_due(demonstrations, counters, Budget(agent_steps=1000, seconds=70.0))
+    assert not cloning_due(demonstrations, counters, Budget(agent_steps=1000, seconds=69.0))
+    counters.cloning_began_at = 61
+    assert not cloning_due(demonstrations, counters, Budget(agent_steps=1000))
+    counters.cloning_began_at, counters.cloning_phases = 60, 2
+    assert cloning_due(demonstrations, counters, Budget(agent_steps=1000, seconds=41.0))  # it was begun

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from dataclasses import asdict, dataclass
@@ -89,6 +90,10 @@ class Budget:
             return counters.agent_steps
         available = max(self.seconds - counters.alignment_seconds - counters.cloning_seconds, 1e-9)
         return min(int(self.agent_steps * counters.interactive_seconds / available), self.agent_steps)
+
+    def seconds_left(self, counters: Counters) -> float:
+        """Wall-clock time left; without a limit, no end of it."""
+        return math.inf if self.seconds is None else self.seconds - counters.seconds
 
     def alignment_extent(self, counters: Counters) -> tuple[str, int, int]:
         """What the Alignment Phase counts, how much is done, and how much there is: gradient steps or seconds."""

@@ -103,8 +103,9 @@ def cloning_due(demonstrations: Demonstrations, counters: Counters, budget: Budg
         return True
     config = demonstrations.config
     return (
-        counters.agent_steps - counters.cloning_began_at >= config.repeat_every
-        and budget.scheduled_steps(counters) <= config.repeat_until
+        counters.cloning_phases < config.phases
+        and counters.agent_steps - counters.cloning_began_at >= config.repeat_every
+        and budget.seconds_left(counters) >= counters.cloning_seconds / counters.cloning_phases
     )
 
 

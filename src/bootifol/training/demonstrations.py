@@ -58,12 +58,12 @@ class DemonstrationConfig:
     cloning_learning_rate: float = 1e-3
     """Of Adam at its highest, rising and falling likewise."""
 
+    phases: int = 3
+    """Cloning Phases of a run. One that a time budget would cut off does not begin."""
+
     repeat_every: int = 1500
     """Agent steps from one Cloning Phase to the next: steps of a policy that moves like the expert teach the inverse
     dynamics what random ones cannot, and every demonstration gets its actions and rewards anew."""
-
-    repeat_until: int = 9000
-    """Agent steps after which no further Cloning Phase begins, and only the rewards teach."""
 
     repeat_share: float = 1.0
     """Gradient steps of each later Cloning Phase, as a share of the first one's."""
@@ -77,13 +77,12 @@ class DemonstrationConfig:
         for name in ("moving_share", "history_dropout", "repeat_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise BootifolError(f"demonstrations: {name} must be in [0, 1], not {getattr(self, name)}")
-        names = ("videos", "inverse_dynamics_updates", "repeat_every", "batch_size")
+        names = ("videos", "inverse_dynamics_updates", "phases", "repeat_every", "batch_size")
         require_at_least(1, **{f"demonstrations.{name}": getattr(self, name) for name in names})
         for name in ("inverse_dynamics_learning_rate", "cloning_learning_rate"):
             if not getattr(self, name) > 0:
                 raise BootifolError(f"demonstrations: {name} must be positive, not {getattr(self, name)}")
-        not_negative = ("cloning_updates", "repeat_until")
-        require_at_least(0, **{f"demonstrations.{name}": getattr(self, name) for name in not_negative})
+        require_at_least(0, **{"demonstrations.cloning_updates": self.cloning_updates})
 
 
 class Demonstrations:
