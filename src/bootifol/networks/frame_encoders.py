@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 from typing import cast
 
@@ -45,20 +44,15 @@ def picture_sizes(video_size: int) -> list[int]:
 
 
 def strided_layers(
-    channels: int,
-    video_size: int,
-    width_divisor: int,
-    leak: float,
-    normalization: Callable[[int], nn.Module] = nn.BatchNorm2d,
+    channels: int, video_size: int, width_divisor: int, leak: float
 ) -> tuple[nn.Sequential, int]:
-    """5x5 stride-2 convolutions down to one pixel, each without bias and followed by normalization and LeakyReLU.
+    """5x5 stride-2 convolutions down to one pixel, each without bias and followed by BatchNorm and LeakyReLU.
 
     Args:
         channels: of the pictures.
         video_size: their side in pixels.
         width_divisor: divides every width; 1 is the paper's network.
         leak: slope of LeakyReLU below zero.
-        normalization: makes the layer that normalizes so many channels.
 
     Returns:
         The layers, and the channels of their last picture.
@@ -67,7 +61,7 @@ def strided_layers(
     layers = nn.Sequential()
     for before, after in pairwise(widths):
         layers.append(StridedConvolution(before, after))
-        layers.append(normalization(after))
+        layers.append(nn.BatchNorm2d(after))
         layers.append(nn.LeakyReLU(leak))
     return layers, widths[-1]
 
