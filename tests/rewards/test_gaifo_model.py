@@ -6,9 +6,11 @@ import torch
 from dot_videos import FRAMES, SIZE, DotVideos
 
 from bootifol.errors import BootifolError
+from bootifol.presets import PRESETS
 from bootifol.rewards.gaifo import losses
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.gaifo.model import GaifoRewardModel
+from bootifol.rewards.registry import make_reward_model
 from bootifol.types import Video
 
 SMALL = GaifoConfig(width_divisor=16, videos_per_class=8, stacks_per_video=4, learning_rate=3e-3)
@@ -148,6 +150,30 @@ def test_the_shorter_class_sets_the_length() -> None:
     cut.videos = long.videos[:, :4]
     one, two = make(), make()
     assert one.update(short, long) == two.update(short, cut)
+
+
+@pytest.mark.parametrize("preset", list(PRESETS))
+def test_every_preset_makes_a_model_that_learns_and_labels(preset: str) -> None:
+    config = PRESETS[preset]  # type: ignore[index]
+    size = config.pictures.video_size
+    reward = replace(config.reward, gaifo=replace(config.reward.gaifo, videos_per_class=2))
+    model = make_reward_model("gaifo", reward, size, seed=0)
+    agent = DotVideos("agent", True, size=size, frames=5)
+    metrics = model.update(DotVideos("expert", False, size=size, frames=5), agent)
+    assert 0.9 < metrics["loss/discriminator"] < 2.0
+    assert model.label(agent[0], []).shape == (4,)
+
+
+def test_the_defaults_are_those_of_the_public_image_version() -> None:
+    """medric49/gaifo, its configuration and networks; stacks of 3 as the paper."""
+    config = GaifoConfig()
+    assert (config.stack, config.videos_per_class * config.stacks_per_video) == (3, 256)
+    assert (config.reward, config.learning_rate, config.leak) == ("softplus", 1e-4, 0.01)
+    weights = {name: tuple(array.shape) for name, array in make(config, size=64).state().items()}
+    convolutions = [weights[f"network/strided.{layer}.weight"] for layer in (0, 3, 6, 9)]
+    assert convolutions == [(64, 9, 5, 5), (128, 64, 5, 5), (256, 128, 5, 5), (512, 256, 5, 5)]
+    linear = [weights[f"network/pointwise.{layer}.weight"] for layer in (0, 3, 6, 9)]
+    assert linear == [(512, 512), (128, 512), (32, 128), (1, 32)]
 
 
 def test_mistakes_are_refused_with_a_sentence() -> None:
