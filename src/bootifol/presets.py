@@ -9,6 +9,7 @@ from bootifol.agents.drqv2 import DrQv2Config
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.registry import RewardConfig
 from bootifol.training.config import (
     AlignmentConfig,
@@ -36,7 +37,10 @@ CPU = TrainingConfig(
             sequence_times=6,
             references=8,
             reward_scale="alignment",
-        )
+        ),
+        gaifo=GaifoConfig(
+            width_divisor=4, videos_per_class=16, stacks_per_video=4, precision="bf16", learning_rate=1e-3
+        ),
     ),
     agent=DrQv2Config(
         encoder="strided",
@@ -82,7 +86,10 @@ DEMO = replace(
 DRAWN = replace(
     CPU,
     pictures=PictureConfig(agent_size=32, video_size=32, stack=2),
-    reward=RewardConfig(replace(CPU.reward.bootifol, width_divisor=8)),
+    reward=RewardConfig(
+        replace(CPU.reward.bootifol, width_divisor=8),
+        gaifo=replace(CPU.reward.gaifo, width_divisor=8),
+    ),
     agent=replace(
         CPU.agent,
         hidden_dim=128,
@@ -114,7 +121,10 @@ with nothing cloned. The learning test runs it."""
 
 SMOKE = replace(
     CPU,
-    reward=RewardConfig(replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4)),
+    reward=RewardConfig(
+        replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4),
+        gaifo=replace(CPU.reward.gaifo, width_divisor=16, videos_per_class=4),
+    ),
     agent=replace(
         CPU.agent,
         hidden_dim=64,

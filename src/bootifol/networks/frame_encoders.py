@@ -43,6 +43,29 @@ def picture_sizes(video_size: int) -> list[int]:
     return sizes
 
 
+def strided_layers(
+    channels: int, video_size: int, width_divisor: int, leak: float
+) -> tuple[nn.Sequential, int]:
+    """5x5 stride-2 convolutions down to one pixel, each without bias and followed by BatchNorm and LeakyReLU.
+
+    Args:
+        channels: of the pictures.
+        video_size: their side in pixels.
+        width_divisor: divides every width; 1 is the paper's network.
+        leak: slope of LeakyReLU below zero.
+
+    Returns:
+        The layers, and the channels of their last picture.
+    """
+    widths = [channels, *(width // width_divisor for width in WIDTHS[: len(picture_sizes(video_size)) - 1])]
+    layers = nn.Sequential()
+    for before, after in pairwise(widths):
+        layers.append(StridedConvolution(before, after))
+        layers.append(nn.BatchNorm2d(after))
+        layers.append(nn.LeakyReLU(leak))
+    return layers, widths[-1]
+
+
 class ViewEncoder(nn.Module):
     """One of g_theta1, g_theta2: strided 5x5 convolutions, then two 1x1 convolutions.
 
@@ -58,16 +81,10 @@ class ViewEncoder(nn.Module):
 
     def __init__(self, channels: int, video_size: int, width_divisor: int = 1, leak: float = 0.2) -> None:
         super().__init__()
-        layers = len(picture_sizes(video_size)) - 1
-        widths = [channels, *(width // width_divisor for width in WIDTHS[:layers])]
         hidden = HIDDEN_WIDTH // width_divisor
-        self.strided = nn.Sequential()
-        for before, after in pairwise(widths):
-            self.strided.append(StridedConvolution(before, after))
-            self.strided.append(nn.BatchNorm2d(after))
-            self.strided.append(nn.LeakyReLU(leak))
+        self.strided, width = strided_layers(channels, video_size, width_divisor, leak)
         self.pointwise = nn.Sequential(
-            nn.Linear(widths[-1], hidden, bias=False),
+            nn.Linear(width, hidden, bias=False),
             nn.BatchNorm1d(hidden),
             nn.LeakyReLU(leak),
             nn.Linear(hidden, VIEW_SIZE),

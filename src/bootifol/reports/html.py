@@ -103,6 +103,11 @@ LOSSES = {
         "The contrast that makes the reward. Healthy: falls in alignment, and rises again while interacting, "
         "because the agent's videos come to look like the expert's. At 0 it teaches nothing more.",
     ),
+    "loss/discriminator": (
+        "Discriminator (L_D of GAIfO)",
+        "The expert's stacks of frames told from others. Healthy: falls from 2 log 2 = 1.39; near 0 while the agent "
+        "acts, the discriminator has won and its reward says little.",
+    ),
     "loss/total": (
         "All losses together",
         "The weighted sum that is minimized. Healthy: falls in alignment and has no sudden jumps afterwards.",

@@ -55,7 +55,7 @@ def train_policy(
         task: from the catalogue, or `gymnasium:ID`, or `module:function`.
         demos: directory of the videos.
         out: directory of the run, new or empty.
-        method: bootifol, or environment for the upper bound.
+        method: bootifol, gaifo, or environment for the upper bound.
         preset: paper, cpu, demo, drawn or smoke.
         seed: of everything random.
         time_budget: seconds of wall-clock time for learning; None for the configuration's agent steps.
@@ -130,14 +130,14 @@ def evaluate_run(directory: Path | str, episodes: int = 10, seed: int = 1000) ->
 
 
 def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[str, Rewards]:
-    """The learned reward along videos, each compared with the same expert videos.
+    """The learned reward along videos, each compared with the same expert videos where the method compares.
 
     Args:
         directory: of the run.
         videos: video files, folders of frames, .npy files or demo sets.
 
     Returns:
-        Rewards `[T]` by the video's name. A video longer than the expert's is scored as far as theirs reach.
+        Rewards `[T]` by the video's name. A video longer than those it is compared with is scored as far as they reach.
     """
     run = RunConfig.read(Path(directory))
     model = build_reward_model(run)
@@ -148,7 +148,7 @@ def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[st
     load_checkpoint(_newest(Path(directory)), {"reward_model": model})
     expert = open_demos(run, Console(stderr=True)).expert
     references = draw_references(model, expert, reference_rng(run.seed, 0))
-    length = min(len(reference.frames) for reference in references)
+    length = min((len(reference.frames) for reference in references), default=None)
     size = run.training.pictures.video_size
     scores: dict[str, Rewards] = {}
     for path in map(Path, videos):

@@ -1,0 +1,60 @@
+"""What can be chosen about GAIfO's discriminator; the defaults are the paper's, or its public image version's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from bootifol.errors import BootifolError, require_at_least
+
+
+@dataclass(frozen=True)
+class GaifoConfig:
+    """GAIfO's discriminator."""
+
+    reward: Literal["softplus", "log_sigmoid", "logit"] = "softplus"
+    """What of the logit x rewards a step, where D = sigmoid(x) is the chance that the expert made it.
+    softplus (the paper and the public image version): -log(1 - D), never below 0. log_sigmoid: log D, never
+    above 0. logit: x, their sum, which has the same slope wherever the discriminator is sure."""
+
+    stack: int = 3
+    """Successive frames that the discriminator sees at once."""
+
+    videos_per_class: int = 256
+    """Expert videos, and as many others, from which a batch is drawn."""
+
+    stacks_per_video: int = 1
+    """Stacks drawn from each of these videos. The public image version draws one; more read fewer videos for a
+    batch of the same size."""
+
+    width_divisor: int = 1
+    """Divides the channels of the 5x5 convolutions; 1 is the public image version's network."""
+
+    leak: float = 0.01
+    """Slope of LeakyReLU below zero."""
+
+    learning_rate: float = 1e-4
+    """Of Adam."""
+
+    precision: Literal["fp32", "bf16"] = "fp32"
+    """bf16 computes the network in bfloat16; parameters, losses and Adam stay in float32."""
+
+    def __post_init__(self) -> None:
+        require_at_least(2, stack=self.stack)
+        require_at_least(
+            1,
+            videos_per_class=self.videos_per_class,
+            stacks_per_video=self.stacks_per_video,
+            width_divisor=self.width_divisor,
+        )
+        require_at_least(0, leak=self.leak)
+        if self.width_divisor > 32:
+            raise BootifolError(f"width_divisor must be at most 32, not {self.width_divisor}")
+        if not self.learning_rate > 0:
+            raise BootifolError(f"learning_rate must be above 0, not {self.learning_rate}")
+        for name, chosen, choices in (
+            ("reward", self.reward, ("softplus", "log_sigmoid", "logit")),
+            ("precision", self.precision, ("fp32", "bf16")),
+        ):
+            if chosen not in choices:
+                raise BootifolError(f"{name} must be one of {', '.join(choices)}, not {chosen}")

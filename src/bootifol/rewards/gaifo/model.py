@@ -1,0 +1,141 @@
+"""GAIfO's reward model: what `training/` sees of the method (arXiv 1807.06158, Algorithm 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import torch
+
+from bootifol.errors import BootifolError
+from bootifol.rewards.checked_videos import checked_videos
+from bootifol.rewards.gaifo import losses
+from bootifol.rewards.gaifo.config import GaifoConfig
+from bootifol.rewards.gaifo.networks import Discriminator
+from bootifol.rewards.gaifo.stacks import as_pictures, draw_stacks, stack_frames
+from bootifol.rewards.gradient_step import statistics_kept_if_refused, take_step
+from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
+from bootifol.types import Arrays, FrameBatch, Metrics, Rewards, Video, VideoSource
+
+LABEL_BATCH = 256
+"""Stacks rewarded at once, which bounds the memory that a long video takes."""
+
+
+class GaifoRewardModel:
+    """A discriminator between the expert's stacks of frames and others.
+
+    Args:
+        config: see there.
+        video_size: side of the (square) videos in pixels.
+        seed: of the parameters and of every draw.
+        device: where to compute, as PyTorch names it.
+    """
+
+    reads_environment_reward = False
+    reference_count = 0
+
+    def __init__(self, config: GaifoConfig, video_size: int, seed: int, device: str = "cpu") -> None:
+        self.config = config
+        self.video_size = video_size
+        self.device = torch.device(device)
+        self.version = 0
+        # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self.discriminator = Discriminator(config, video_size)
+        self.discriminator.to(self.device)
+        self._optimizer = torch.optim.Adam(
+            self.discriminator.parameters(), lr=config.learning_rate, fused=True
+        )
+        self._rng = np.random.default_rng(seed)
+
+    def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
+        """Alignment Phase, which the paper does not have: one gradient step with random videos as the other class."""
+        while True:
+            yield self._step(expert, other)
+
+    def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:
+        """Interactive Phase: one gradient step with the agent's own videos as the other class."""
+        return self._step(expert, agent)
+
+    def label(self, video: Video, references: Sequence[Video] = ()) -> Rewards:
+        """`r_t` of the logit of the stack that ends at frame t + 1; references are not looked at.
+
+        Raises:
+            BootifolError: the video has another size than the model was made for.
+        """
+        frames = checked_videos(video.frames[None], self.video_size)[0]
+        if len(frames) < 2:
+            return np.zeros(0, np.float32)
+        ends = np.arange(1, len(frames))
+        indices = stack_frames(ends, self.config.stack)
+        self.discriminator.eval()
+        try:
+            with torch.inference_mode():
+                logits = [
+                    self._logits(as_pictures(frames[part]))
+                    for part in np.split(indices, range(LABEL_BATCH, len(indices), LABEL_BATCH))
+                ]
+                return losses.reward(torch.cat(logits), self.config.reward).cpu().numpy()
+        finally:
+            self.discriminator.train()
+
+    def state(self) -> Arrays:
+        """Parameters, BatchNorm statistics, Adam, random state and version."""
+        return {
+            **module_state(self.discriminator, self._optimizer),
+            "random": generator_array(self._rng),
+            "version": np.array([self.version], dtype=np.int64),
+        }
+
+    def load_state(self, arrays: Arrays) -> None:
+        """Takes over what `state` gave; goes on bit for bit as that model would.
+
+        Raises:
+            BootifolError: an array is missing or has another shape (the run had another configuration).
+        """
+        load_module_state(self.discriminator, self._optimizer, arrays)
+        load_generator(self._rng, arrays["random"])
+        self.version = int(arrays["version"][0])
+
+    def _step(self, expert: VideoSource, other: VideoSource) -> Metrics:
+        """Algorithm 1, "update the discriminator": sample as many stacks of either class, go down L_D once."""
+        videos = [
+            checked_videos(source.sample(self.config.videos_per_class, self._rng), self.video_size)
+            for source in (expert, other)
+        ]
+        # Beyond the shorter class's length, how late it is would tell the classes apart.
+        length = min(of_class.shape[1] for of_class in videos)
+        if length < 2:
+            raise BootifolError(
+                "the videos have one frame, but the discriminator looks at changes between frames; use longer videos"
+            )
+        stacks = [
+            draw_stacks(of_class[:, :length], self.config.stacks_per_video, self.config.stack, self._rng)
+            for of_class in videos
+        ]
+        with statistics_kept_if_refused(self.discriminator):
+            loss, metrics = self._loss(*stacks)
+            take_step(self.discriminator, self._optimizer, loss, metrics, self.version)
+        self.version += 1
+        return metrics
+
+    def _loss(self, expert: FrameBatch, other: FrameBatch) -> tuple[torch.Tensor, Metrics]:
+        """L_D and the metrics on stacks of both classes, uint8 `[N, stack, H, W, 3]` each."""
+        pictures = as_pictures(np.concatenate([expert, other]))
+        expert_logits, other_logits = self._logits(pictures).chunk(2)
+        loss = losses.discriminator_loss(expert_logits, other_logits)
+        with torch.no_grad():
+            right = torch.cat([expert_logits > 0, other_logits <= 0]).float().mean()
+            return loss, {
+                "loss/discriminator": float(loss),
+                "discriminator/accuracy": float(right),
+                "discriminator/expert": float(torch.sigmoid(expert_logits).mean()),
+                "discriminator/other": float(torch.sigmoid(other_logits).mean()),
+            }
+
+    def _logits(self, pictures: torch.Tensor) -> torch.Tensor:
+        """Float32 logits `[N]` of stacks `[N, 3 * stack, H, W]`."""
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.precision == "bf16"):
+            logits: torch.Tensor = self.discriminator(pictures.to(self.device))
+            return logits.float()
