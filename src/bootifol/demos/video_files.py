@@ -14,6 +14,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
 from bootifol.errors import BootifolError
@@ -26,6 +27,9 @@ PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 # People look at these videos: enlarge small pictures to at least this many pixels.
 _SMALLEST_SHOWN = 256
+
+# Pixels longer than this are a damaged header, not a format that anyone films in (the widest, anamorphic, is 2).
+_MOST_STRETCHED = 4
 
 
 @dataclass(frozen=True)
@@ -195,7 +199,7 @@ def _stream_folder(path: Path) -> Iterator[TimedFrame]:
     for file in pictures:
         try:
             with Image.open(file) as picture:
-                frame = np.asarray(ImageOps.exif_transpose(picture).convert("RGB"))
+                frame = _picture(picture)
         except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
             raise BootifolError(f"{file} is damaged or no picture: {error}") from error
         if size is not None and frame.shape[:2] != size:
@@ -287,12 +291,12 @@ def _stream_file(path: Path) -> Iterator[TimedFrame]:
                 lasts = frame.duration * frame.time_base if frame.duration and frame.time_base else 0
                 end = seconds + float(lasts)
                 count += 1
-                yield TimedFrame(_upright(frame), seconds - first)
+                yield TimedFrame(_upright(frame, stream.sample_aspect_ratio), seconds - first)
         except av.FFmpegError as error:
             raise _truncated(path, count, promised, str(error.strerror)) from error
         promised_seconds = _promised_seconds(container)
     if count == 0:
-        raise BootifolError(f"{path} holds no pictures: copy or export it again")
+        raise BootifolError(f"{path} holds no pictures (damaged or truncated?): copy or export it again")
     if count < promised:
         raise _truncated(path, count, promised, "it ends too early")
     # Where frames are not counted the length may still be known; the last frame's own duration may not be.
@@ -332,7 +336,7 @@ def stream_part(path: Path, start: float, end: float) -> Iterator[TimedFrame]:
                         f"{path} is damaged: the picture at {frame.time:.2f} s is corrupt; copy or export it again"
                     )
                 first = frame.time if first is None else first
-                yield TimedFrame(_upright(frame), frame.time - first)
+                yield TimedFrame(_upright(frame, stream.sample_aspect_ratio), frame.time - first)
         except av.FFmpegError as error:
             raise BootifolError(
                 f"{path} is damaged or truncated between {start:.2f} and {end:.2f} s ({error.strerror}): "
@@ -371,10 +375,42 @@ def _promised_seconds(container: av.container.InputContainer) -> float | None:
     return float(container.duration / av.time_base)
 
 
-def _upright(frame: av.VideoFrame) -> Frame:
-    """The picture as people see it: phones store portrait videos lying down, with a note how to turn them."""
-    pixels = frame.to_ndarray(format="rgb24")
+def _upright(frame: av.VideoFrame, pixel_aspect: Fraction | None) -> Frame:
+    """The picture as people see it.
+
+    What is transparent is white. Pixels that are not square are stretched, never shrunk. Phones store portrait videos
+    lying down, with a note how to turn them.
+
+    Args:
+        frame: as decoded.
+        pixel_aspect: width of a pixel divided by its height; None and nonsense count as 1.
+    """
+    if any(component.is_alpha for component in frame.format.components):
+        pixels = over_white(np.asarray(frame.to_ndarray(format="rgba"), np.uint8))
+    else:
+        pixels = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
+    if pixel_aspect and pixel_aspect != 1 and 1 / _MOST_STRETCHED <= pixel_aspect <= _MOST_STRETCHED:
+        height, width = pixels.shape[:2]
+        square = (round(width * max(1, pixel_aspect)), round(height * max(1, 1 / pixel_aspect)))
+        pixels = np.asarray(Image.fromarray(pixels).resize(square, Image.Resampling.BILINEAR))
     return np.ascontiguousarray(np.rot90(pixels, k=round(frame.rotation / 90)))
+
+
+def over_white(pixels: NDArray[np.uint8]) -> Frame:
+    """A picture with alpha, uint8 `[H, W, 4]`, on a white ground as browsers show it: uint8 `[H, W, 3]`."""
+    alpha = pixels[..., 3:].astype(np.uint16)
+    blended: Frame = ((pixels[..., :3] * alpha + 255 * (255 - alpha) + 127) // 255).astype(np.uint8)
+    return blended
+
+
+def _picture(picture: Image.Image) -> Frame:
+    """A still picture upright, transparent places white, 16 bits a pixel scaled to 8: uint8 `[H, W, 3]`."""
+    upright = ImageOps.exif_transpose(picture)
+    if upright.has_transparency_data:
+        return over_white(np.asarray(upright.convert("RGBA")))
+    if upright.mode.startswith("I"):  # otherwise all above 255 of 65535 would be white
+        upright = Image.fromarray((np.asarray(upright) >> 8).clip(0, 255).astype(np.uint8))
+    return np.asarray(upright.convert("RGB"))
 
 
 def _truncated(path: Path, count: int, promised: int, why: str) -> BootifolError:
