@@ -83,8 +83,8 @@ def import_(
     A .npz archive may hold one such array among others. A LeRobot dataset of format v3 (its directory) gives one
     video an episode: its pictures alone, never its actions or states.
 
-    The largest centered square of every picture is cut out and resized, after turning it upright, stretching pixels that
-    are not square, and putting white behind what is transparent. What was done to which file is written down
+    The largest centered square of every picture is cut out and resized, after turning it upright, stretching pixels
+    that are not square, and putting white behind what is transparent. What was done to which file is written down
     in OUT/BEHAVIOR/manifest.json, and OUT/BEHAVIOR/contact_sheet.png shows the result.
 
     Args:
