@@ -4,9 +4,9 @@
 
 Whole files of the awkward corpus (`tests/demos/awkward_files.py`) are damaged at random: bytes changed, a piece cut
 off, taken out, repeated or copied in from another file. A worker process reads each and is watched from outside, for a
-crash takes its process along and a hang never returns. Exit code 1 on a crash, a hang, another exception than a refusal,
-or a cut file read as if it were whole; the files that did it are kept in --keep. "Read otherwise": another number of
-frames than before the damage, which may have changed what the file says of itself.
+crash takes its process along and a hang never returns. Exit code 1 on a crash, a hang, another exception than a
+refusal, or a cut file read as if it were whole; the files that did it are kept in --keep. "Read otherwise": another
+number of frames than before the damage, which may have changed what the file says of itself.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ First frames are compared with first frames: what happens later is up to whoever
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -44,8 +45,9 @@ _LABEL = 22
 _SMALLEST_PICTURE = 128
 
 
+@cache
 def first_frames(task: Task, pictures: PictureConfig) -> Frames:
-    """How the environment looks at the start of `SEEDS` episodes, uint8 `[SEEDS, H, W, 3]`."""
+    """How the environment looks at the start of `SEEDS` episodes, uint8 `[SEEDS, H, W, 3]`; once a process."""
     environment = make_environment(task.name, pictures, task.episode_steps, task.action_repeat)
     try:
         return np.stack([environment.reset(seed=seed)[1]["video_frame"] for seed in range(SEEDS)])
