@@ -259,7 +259,15 @@ def _broken(directory: Path) -> list[Awkward]:
     faststart = {"movflags": "+faststart"}
     index_first = encode(directory / "index_first.mp4", scene(), container_options=faststart).read_bytes()
     webm = encode(directory / "whole.webm", scene(), "libvpx-vp9").read_bytes()
+    avi = encode(directory / "whole.avi", scene(), "mjpeg", "yuvj420p").read_bytes()
+    np.savez(directory / "whole.npz", pictures=scene())
+    archive = (directory / "whole.npz").read_bytes()
+    brace = archive.index(b"}")
     contents = {
+        "cut_in_the_last_picture.webm": (webm[:-40], "truncated"),
+        "cut_in_the_last_picture.avi": (avi[: avi.rindex(b"idx1") - 9], "truncated"),
+        "cut_before_the_last_picture.avi": (avi[: avi.rindex(b"00dc", 0, avi.rindex(b"idx1"))], "truncated"),
+        "open_header.npz": (archive[:brace] + b" " + archive[brace + 1 :], "damaged"),
         "cut_in_the_pictures.mp4": (
             index_first[: int(len(index_first) * 0.8)],
             r"damaged or truncated: \d+ of 12",
@@ -277,7 +285,7 @@ def _broken(directory: Path) -> list[Awkward]:
     }
     for name, (data, _) in contents.items():
         (directory / name).write_bytes(data)
-    for name in ("index_last.mp4", "index_first.mp4", "whole.webm"):
+    for name in ("index_last.mp4", "index_first.mp4", "whole.webm", "whole.avi", "whole.npz"):
         (directory / name).unlink()
     return [Awkward(directory / name, refusal=refusal) for name, (_, refusal) in contents.items()]
 

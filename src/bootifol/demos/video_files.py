@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -30,6 +31,10 @@ _SMALLEST_SHOWN = 256
 
 # Pixels longer than this are a damaged header, not a format that anyone films in (the widest, anamorphic, is 2).
 _MOST_STRETCHED = 4
+
+
+# What numpy raises on a damaged header, which it reads as a Python literal.
+_DAMAGED_ARRAY = (ValueError, OSError, EOFError, SyntaxError, tokenize.TokenError, MemoryError, TypeError)
 
 
 @dataclass(frozen=True)
@@ -225,7 +230,7 @@ def _natural_order(path: Path) -> list[tuple[int, str]]:
 def _stream_array(path: Path) -> Iterator[TimedFrame]:
     try:
         frames = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
+    except _DAMAGED_ARRAY as error:
         raise BootifolError(f"{path} is damaged or no numpy array: {error}") from error
     if frames.dtype != np.uint8 or frames.ndim != 4 or frames.shape[-1] != 3 or frames.size == 0:
         raise BootifolError(
@@ -250,7 +255,7 @@ def _stream_archive(path: Path) -> Iterator[TimedFrame]:
                 f"width, 3], among {listed or 'nothing'}: save the one video alone"
             )
         frames = np.load(path, allow_pickle=False)[videos[0]]
-    except (ValueError, OSError, EOFError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+    except (*_DAMAGED_ARRAY, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise BootifolError(f"{path} is damaged or no .npz archive: {error}") from error
     for frame in frames:
         yield TimedFrame(np.array(frame), None)
@@ -299,6 +304,11 @@ def _stream_file(path: Path) -> Iterator[TimedFrame]:
         raise BootifolError(f"{path} holds no pictures (damaged or truncated?): copy or export it again")
     if count < promised:
         raise _truncated(path, count, promised, "it ends too early")
+    if path.stat().st_size < _promised_bytes(path):
+        raise BootifolError(
+            f"{path} is truncated: it has {path.stat().st_size:,} of {_promised_bytes(path):,} bytes; copy or export "
+            "it again"
+        )
     # Where frames are not counted the length may still be known; the last frame's own duration may not be.
     if not promised and promised_seconds is not None and end + 1.5 * end / count < promised_seconds:
         raise BootifolError(
@@ -373,6 +383,33 @@ def _promised_seconds(container: av.container.InputContainer) -> float | None:
     if container.duration is None or len(container.streams) > 1:
         return None
     return float(container.duration / av.time_base)
+
+
+def _promised_bytes(path: Path) -> int:
+    """How long an avi, webm or mkv file says it is; 0 when it does not say. These play without their last bytes."""
+    with path.open("rb") as file:
+        head = file.read(4096)
+    if head[:4] == b"RIFF":
+        size = int.from_bytes(head[4:8], "little")
+        return 8 + size if size < 0xFFFFFFFF else 0
+    if head[:4] != b"\x1aE\xdf\xa3":
+        return 0
+    # EBML: an element is its name, its size as a number whose leading zero bits tell its length, and its contents.
+    header, header_bytes = _ebml_size(head, 4)
+    segment = header + (header_bytes or 0)
+    if head[segment : segment + 4] != b"\x18S\x80g":
+        return 0
+    start, size = _ebml_size(head, segment + 4)
+    return start + size if size is not None else 0
+
+
+def _ebml_size(head: bytes, place: int) -> tuple[int, int | None]:
+    """Where an element's contents begin, and their size; None when it was not known (a live recording)."""
+    length = 9 - head[place].bit_length() if place < len(head) else 9
+    if length > 8:
+        return place, None
+    unmarked = int.from_bytes(head[place : place + length], "big") - (1 << 7 * length)
+    return place + length, unmarked if unmarked != (1 << 7 * length) - 1 else None
 
 
 def _upright(frame: av.VideoFrame, pixel_aspect: Fraction | None) -> Frame:
