@@ -390,8 +390,8 @@ def _promised_bytes(path: Path) -> int:
     with path.open("rb") as file:
         head = file.read(4096)
     if head[:4] == b"RIFF":
-        size = int.from_bytes(head[4:8], "little")
-        return 8 + size if size < 0xFFFFFFFF else 0
+        riff = int.from_bytes(head[4:8], "little")
+        return 8 + riff if riff < 0xFFFFFFFF else 0
     if head[:4] != b"\x1aE\xdf\xa3":
         return 0
     # EBML: an element is its name, its size as a number whose leading zero bits tell its length, and its contents.
