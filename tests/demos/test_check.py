@@ -6,9 +6,9 @@ import pytest
 from PIL import Image
 from small_demo_sets import FRAMES, SIZE, WriteSet, moving_videos
 
-from bootifol.demos.check import check_demo_set, differences
+from bootifol.demos.check import Defects, check_demo_set, differences
 from bootifol.demos.contact_sheet import contact_sheet
-from bootifol.demos.manifest import Manifest, read_manifest
+from bootifol.demos.manifest import Manifest, read_manifest, write_manifest
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.tasks import task_named
@@ -19,8 +19,9 @@ def test_duplicates_and_frozen_videos_are_named(write_set: WriteSet) -> None:
     videos[4] = videos[1]
     videos[2] = videos[2, :1]
     checked = check_demo_set(write_set(videos))
-    assert checked.duplicates == (("drawn-expert-000001", "drawn-expert-000004"),)
-    assert checked.frozen == ("drawn-expert-000002",)
+    assert checked.defects.duplicates == (("drawn-expert-000001", "drawn-expert-000004"),)
+    assert checked.defects.frozen == ("drawn-expert-000002",)
+    assert len(checked.defects.sentences()) == 2
     assert checked.bytes_on_disk == sum(
         path.stat().st_size for path in checked.contact_sheet.parent.glob("*.npy")
     )
@@ -29,8 +30,39 @@ def test_duplicates_and_frozen_videos_are_named(write_set: WriteSet) -> None:
 
 def test_a_video_that_moves_in_one_pixel_is_not_frozen(write_set: WriteSet) -> None:
     videos = np.zeros((1, FRAMES, SIZE, SIZE, 3), np.uint8)
-    videos[0, -1, 0, 0, 0] = 1
-    assert check_demo_set(write_set(videos)).frozen == ()
+    videos[0, -1, 0, 0, 0] = 100
+    assert check_demo_set(write_set(videos)).defects.frozen == ()
+
+
+def test_videos_without_action_may_stand_still(write_set: WriteSet) -> None:
+    videos = moving_videos(2)[:, :1].repeat(FRAMES, axis=1)
+    assert check_demo_set(write_set(videos, behavior="still")).defects == Defects()
+
+
+def test_padding_is_no_stillness(write_set: WriteSet) -> None:
+    videos = moving_videos(3)
+    videos[2, 2:] = videos[2, 1]
+    directory = write_set(videos)
+    assert check_demo_set(directory).defects.half_frozen == ("drawn-expert-000002",)
+    manifest = read_manifest(directory)
+    ended_early = replace(manifest.videos[2], length=2)
+    write_manifest(directory, replace(manifest, videos=(*manifest.videos[:2], ended_early)))
+    assert check_demo_set(directory).defects.half_frozen == ()
+
+
+def test_an_expert_that_always_holds_its_goal_stands_still_honestly(write_set: WriteSet) -> None:
+    videos = moving_videos(3)
+    videos[:, 2:] = videos[:, 1:2]
+    assert check_demo_set(write_set(videos)).defects.half_frozen == ()
+
+
+def test_an_imported_video_is_named_with_its_file(write_set: WriteSet) -> None:
+    directory = write_set(moving_videos(1)[:, :1].repeat(FRAMES, axis=1))
+    manifest = read_manifest(directory)
+    entry = replace(manifest.videos[0], source={"file": "IMG_7.mov", "first_frame": 61})
+    write_manifest(directory, replace(manifest, videos=(entry,)))
+    [sentence] = check_demo_set(directory).defects.sentences()
+    assert "drawn-expert-000000 (IMG_7.mov from frame 61 on): leave them out" in sentence
 
 
 def test_damage_gives_a_sentence(write_set: WriteSet) -> None:

@@ -83,7 +83,8 @@ def import_(
     A .npz archive may hold one such array among others. A LeRobot dataset of format v3 (its directory) gives one
     video an episode: its pictures alone, never its actions or states.
 
-    The largest centered square of every picture is cut out and resized. What was done to which file is written down
+    The largest centered square of every picture is cut out and resized, after turning it upright, stretching pixels
+    that are not square, and putting white behind what is transparent. What was done to which file is written down
     in OUT/BEHAVIOR/manifest.json, and OUT/BEHAVIOR/contact_sheet.png shows the result.
 
     Args:
@@ -122,6 +123,10 @@ def check(
 ) -> int:
     """Read every byte of recorded or imported videos and say whether they are whole and worth learning from.
 
+    Looks for videos that come twice (also compressed again), that stand still, go blank or change their scene. With a
+    task it compares frame rate, length, brightness, color, contrast and camera, and writes first_frames.png beside
+    the videos: theirs above the environment's.
+
     Exits with 0 when all is well, with 1 when the videos do not fit the task, with 2 when they are damaged.
 
     Args:
@@ -144,17 +149,14 @@ def check(
             f"  {checked.bytes_on_disk / 1e6:,.1f} MB in {_count(len(manifest.shards), 'file')}; every checksum agrees"
         )
         print(f"  {_origin(manifest)}")
-        for names in checked.duplicates:
-            print(f"  the same video {len(names)} times: {', '.join(names)}; keep one of them")
-        if checked.frozen and manifest.behavior != "still":
-            print(
-                f"  nothing moves in {', '.join(checked.frozen)}: leave them out, unless the task is to keep still"
-            )
+        for sentence in checked.defects.sentences():
+            print(f"  {sentence}")
         for difference in checked.differences:
             print(f"  {difference}")
         if task is not None and not checked.differences:
             print(f"  fits the task {task}")
-        print(f"  look at {checked.contact_sheet}")
+        shown = f" and {checked.first_frames}" if checked.first_frames is not None else ""
+        print(f"  look at {checked.contact_sheet}{shown}")
         fits = fits and not checked.differences
     return 0 if fits else 1
 

@@ -3,14 +3,69 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from bootifol.demos.appearance import (
+    FIRST_FRAMES_NAME,
+    differences_of_looks,
+    first_frames,
+    write_first_frames,
+)
 from bootifol.demos.contact_sheet import write_contact_sheet
-from bootifol.demos.demo_set import DemoSet
-from bootifol.demos.manifest import Manifest
+from bootifol.demos.demo_set import DemoSet, listed
+from bootifol.demos.looks import Looks, look_at
+from bootifol.demos.manifest import Manifest, VideoEntry
+from bootifol.demos.near_duplicates import near_duplicates
 from bootifol.envs.pictures import PictureConfig
+from bootifol.progress import progress
 from bootifol.tasks import Task, make_environment
+
+LONG_STILLNESS = 0.5
+"""Share of a video that may pass without motion before something moves. In recorded experts it is at most 0.2."""
+
+USUAL_STILLNESS = 0.25
+"""Where half of the videos stand still at their end for less than this, one that does for `LONG_STILLNESS` is odd. An
+expert that holds its goal stands still for two thirds of every video, and that is no fault."""
+
+
+@dataclass(frozen=True)
+class Defects:
+    """Videos that may not be worth learning from, by name (with the file they come from, when imported)."""
+
+    duplicates: tuple[tuple[str, ...], ...] = ()
+    """Equal to the last pixel, in groups."""
+    near_duplicates: tuple[tuple[str, ...], ...] = ()
+    """Showing the same, in groups, though some pixels differ."""
+    frozen: tuple[str, ...] = ()
+    """Showing one picture throughout."""
+    half_frozen: tuple[str, ...] = ()
+    """Showing one picture for more than half of their length."""
+    blank: tuple[str, ...] = ()
+    """With pictures that are black, white or of any one color."""
+    cut: tuple[str, ...] = ()
+    """Going over to another scene, and the frame where they do."""
+
+    def sentences(self) -> list[str]:
+        """One sentence a defect, with what to do."""
+        found = [
+            f"the same video {len(names)} times: {listed(names)}; keep one of them"
+            for names in self.duplicates
+        ]
+        found += [
+            f"nearly the same video {len(names)} times (compressed again?): {listed(names)}; keep one of them"
+            for names in self.near_duplicates
+        ]
+        advice = {
+            "nothing moves in {}: leave them out, unless the task is to keep still": self.frozen,
+            "nothing moves for more than half of {}: trim the waiting before you import": self.half_frozen,
+            "some pictures are black, white or of one color in {}: trim fades and title pages": self.blank,
+            "the whole picture changes at once in {}: split the file at the cut, one scene a file": self.cut,
+        }
+        return found + [sentence.format(listed(names)) for sentence, names in advice.items() if names]
 
 
 @dataclass(frozen=True)
@@ -19,20 +74,19 @@ class CheckedSet:
 
     manifest: Manifest
     bytes_on_disk: int
-    duplicates: tuple[tuple[str, ...], ...]
-    """Names of videos that are equal to the last pixel, in groups."""
-    frozen: tuple[str, ...]
-    """Names of videos that show one picture throughout."""
+    defects: Defects
     differences: tuple[str, ...]
     """How the set differs from the task, each with what to do; empty without a task."""
     contact_sheet: Path
+    first_frames: Path | None
+    """First frames of videos and environment; None without a task, or when the videos show another one."""
 
 
 def check_demo_set(path: Path, task: Task | None = None) -> CheckedSet:
     """Reads every byte of a demo set, compares every checksum and looks at every video.
 
     Args:
-        path: directory of one demo set; `contact_sheet.png` is written into it.
+        path: directory of one demo set; `contact_sheet.png` is written into it, and `first_frames.png` with a task.
         task: to compare with.
 
     Raises:
@@ -40,18 +94,92 @@ def check_demo_set(path: Path, task: Task | None = None) -> CheckedSet:
     """
     demo_set = DemoSet.open(path, verify=True)
     manifest = demo_set.manifest
-    by_pixels: dict[str, list[str]] = defaultdict(list)
-    for entry in manifest.videos:
-        by_pixels[entry.sha256].append(entry.name)
-    videos = (demo_set[index] for index in range(len(demo_set)))
+    looks = _look_at_all(demo_set)
+    found = differences(manifest, task) if task is not None else []
+    picture = None
+    if task is not None and manifest.task in (None, task.name):
+        videos = np.stack([video.first for video in looks])
+        environment = first_frames(task, _pictures_of(manifest))
+        picture = write_first_frames(path, videos, environment)
+        found += differences_of_looks(videos, environment, path / FIRST_FRAMES_NAME)
     return CheckedSet(
         manifest=manifest,
         bytes_on_disk=sum(shard.bytes for shard in manifest.shards),
-        duplicates=tuple(tuple(names) for names in by_pixels.values() if len(names) > 1),
-        frozen=tuple(video.name for video in videos if (video.frames == video.frames[0]).all()),
-        differences=tuple(differences(manifest, task)) if task is not None else (),
+        defects=find_defects(manifest, looks),
+        differences=tuple(found),
         contact_sheet=write_contact_sheet(path, demo_set),
+        first_frames=picture,
     )
+
+
+def find_defects(manifest: Manifest, looks: Sequence[Looks]) -> Defects:
+    """What is wrong with single videos; those of nobody acting, or of a half-good one, may stand still.
+
+    Args:
+        manifest: of the demo set.
+        looks: of its videos, in its order.
+    """
+    entries = manifest.videos
+    by_pixels: dict[str, list[int]] = defaultdict(list)
+    for index, entry in enumerate(entries):
+        by_pixels[entry.sha256].append(index)
+    frozen = [index for index, video in enumerate(looks) if video.still_at_end == 1.0]
+    # Of equal videos one is compared with the others, and videos without motion are named already.
+    compared = sorted({indices[0] for indices in by_pixels.values()} - set(frozen))
+    near = near_duplicates(np.stack([looks[index].digest for index in compared])) if compared else []
+    usually = float(np.median([video.still_at_end for video in looks])) < USUAL_STILLNESS
+    half_frozen = [
+        index
+        for index, video in enumerate(looks)
+        if video.still_before_motion > LONG_STILLNESS
+        or (usually and 1.0 > video.still_at_end > LONG_STILLNESS)
+    ]
+    still = manifest.behavior == "still"
+    return Defects(
+        duplicates=tuple(_named(entries, indices) for indices in by_pixels.values() if len(indices) > 1),
+        near_duplicates=tuple(_named(entries, [compared[place] for place in group]) for group in near),
+        frozen=() if still else _named(entries, frozen),
+        half_frozen=() if still or manifest.behavior == "half_good" else _named(entries, half_frozen),
+        blank=_named(entries, [index for index, video in enumerate(looks) if video.blank]),
+        cut=tuple(
+            f"{_name(entry)} at frame {video.cut}"
+            for entry, video in zip(entries, looks, strict=True)
+            if video.cut is not None
+        ),
+    )
+
+
+def _look_at_all(demo_set: DemoSet) -> list[Looks]:
+    looks = []
+    with progress(f"looking at {demo_set.manifest.name}", total=len(demo_set)) as advance:
+        for index, entry in enumerate(demo_set.manifest.videos):
+            looks.append(look_at(demo_set[index].frames[: entry.length]))
+            advance()
+    return looks
+
+
+def _pictures_of(manifest: Manifest) -> PictureConfig:
+    """How to show the environment so that it may look like these videos."""
+    default = PictureConfig()
+    return PictureConfig(
+        agent_size=manifest.agent_size or manifest.video_size,
+        video_size=manifest.video_size,
+        profile=manifest.render_profile or default.profile,  # type: ignore[arg-type]
+    )
+
+
+def _named(entries: Sequence[VideoEntry], indices: Sequence[int]) -> tuple[str, ...]:
+    return tuple(_name(entries[index]) for index in indices)
+
+
+def _name(entry: VideoEntry) -> str:
+    """The video's name, and for imported ones where to find it."""
+    if "file" not in entry.source:
+        return entry.name
+    episode = f" episode {entry.source['episode']}" if "episode" in entry.source else ""
+    start = entry.source.get("first_frame")
+    window = f" from frame {start} on" if start else ""
+    return f"{entry.name} ({entry.source['file']}{episode}{window})"
 
 
 def differences(manifest: Manifest, task: Task, pictures: PictureConfig | None = None) -> list[str]:

@@ -113,7 +113,7 @@ class DemoSet:
                 ]
                 if damaged:
                     raise BootifolError(
-                        f"{self.path / shard.file} is damaged: the pixels of {_listed(damaged)} are not "
+                        f"{self.path / shard.file} is damaged: the pixels of {listed(damaged)} are not "
                         "the ones recorded; restore the file or record the set again"
                     )
                 if sha256_of_file(self.path / shard.file) != shard.sha256:
@@ -179,6 +179,7 @@ def find_demo_sets(path: Path | str) -> dict[str, Path]:
     return found
 
 
-def _listed(names: Sequence[str], most: int = 5) -> str:
+def listed(names: Sequence[str], most: int = 5) -> str:
+    """Names for a sentence, the first few when there are many."""
     shown = ", ".join(names[:most])
     return f"{shown} and {len(names) - most} more" if len(names) > most else shown

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
 from bootifol.errors import BootifolError
@@ -26,6 +28,13 @@ PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 # People look at these videos: enlarge small pictures to at least this many pixels.
 _SMALLEST_SHOWN = 256
+
+# Pixels longer than this are a damaged header, not a format that anyone films in (the widest, anamorphic, is 2).
+_MOST_STRETCHED = 4
+
+
+# What numpy raises on a damaged header, which it reads as a Python literal.
+_DAMAGED_ARRAY = (ValueError, OSError, EOFError, SyntaxError, tokenize.TokenError, MemoryError, TypeError)
 
 
 @dataclass(frozen=True)
@@ -195,7 +204,7 @@ def _stream_folder(path: Path) -> Iterator[TimedFrame]:
     for file in pictures:
         try:
             with Image.open(file) as picture:
-                frame = np.asarray(ImageOps.exif_transpose(picture).convert("RGB"))
+                frame = _picture(picture)
         except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
             raise BootifolError(f"{file} is damaged or no picture: {error}") from error
         if size is not None and frame.shape[:2] != size:
@@ -221,7 +230,7 @@ def _natural_order(path: Path) -> list[tuple[int, str]]:
 def _stream_array(path: Path) -> Iterator[TimedFrame]:
     try:
         frames = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
+    except _DAMAGED_ARRAY as error:
         raise BootifolError(f"{path} is damaged or no numpy array: {error}") from error
     if frames.dtype != np.uint8 or frames.ndim != 4 or frames.shape[-1] != 3 or frames.size == 0:
         raise BootifolError(
@@ -246,7 +255,7 @@ def _stream_archive(path: Path) -> Iterator[TimedFrame]:
                 f"width, 3], among {listed or 'nothing'}: save the one video alone"
             )
         frames = np.load(path, allow_pickle=False)[videos[0]]
-    except (ValueError, OSError, EOFError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+    except (*_DAMAGED_ARRAY, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise BootifolError(f"{path} is damaged or no .npz archive: {error}") from error
     for frame in frames:
         yield TimedFrame(np.array(frame), None)
@@ -287,14 +296,19 @@ def _stream_file(path: Path) -> Iterator[TimedFrame]:
                 lasts = frame.duration * frame.time_base if frame.duration and frame.time_base else 0
                 end = seconds + float(lasts)
                 count += 1
-                yield TimedFrame(_upright(frame), seconds - first)
+                yield TimedFrame(_upright(frame, stream.sample_aspect_ratio), seconds - first)
         except av.FFmpegError as error:
             raise _truncated(path, count, promised, str(error.strerror)) from error
         promised_seconds = _promised_seconds(container)
     if count == 0:
-        raise BootifolError(f"{path} holds no pictures: copy or export it again")
+        raise BootifolError(f"{path} holds no pictures (damaged or truncated?): copy or export it again")
     if count < promised:
         raise _truncated(path, count, promised, "it ends too early")
+    if path.stat().st_size < _promised_bytes(path):
+        raise BootifolError(
+            f"{path} is truncated: it has {path.stat().st_size:,} of {_promised_bytes(path):,} bytes; copy or export "
+            "it again"
+        )
     # Where frames are not counted the length may still be known; the last frame's own duration may not be.
     if not promised and promised_seconds is not None and end + 1.5 * end / count < promised_seconds:
         raise BootifolError(
@@ -332,7 +346,7 @@ def stream_part(path: Path, start: float, end: float) -> Iterator[TimedFrame]:
                         f"{path} is damaged: the picture at {frame.time:.2f} s is corrupt; copy or export it again"
                     )
                 first = frame.time if first is None else first
-                yield TimedFrame(_upright(frame), frame.time - first)
+                yield TimedFrame(_upright(frame, stream.sample_aspect_ratio), frame.time - first)
         except av.FFmpegError as error:
             raise BootifolError(
                 f"{path} is damaged or truncated between {start:.2f} and {end:.2f} s ({error.strerror}): "
@@ -371,10 +385,69 @@ def _promised_seconds(container: av.container.InputContainer) -> float | None:
     return float(container.duration / av.time_base)
 
 
-def _upright(frame: av.VideoFrame) -> Frame:
-    """The picture as people see it: phones store portrait videos lying down, with a note how to turn them."""
-    pixels = frame.to_ndarray(format="rgb24")
+def _promised_bytes(path: Path) -> int:
+    """How long an avi, webm or mkv file says it is; 0 when it does not say. These play without their last bytes."""
+    with path.open("rb") as file:
+        head = file.read(4096)
+    if head[:4] == b"RIFF":
+        riff = int.from_bytes(head[4:8], "little")
+        return 8 + riff if riff < 0xFFFFFFFF else 0
+    if head[:4] != b"\x1aE\xdf\xa3":
+        return 0
+    # EBML: an element is its name, its size as a number whose leading zero bits tell its length, and its contents.
+    header, header_bytes = _ebml_size(head, 4)
+    segment = header + (header_bytes or 0)
+    if head[segment : segment + 4] != b"\x18S\x80g":
+        return 0
+    start, size = _ebml_size(head, segment + 4)
+    return start + size if size is not None else 0
+
+
+def _ebml_size(head: bytes, place: int) -> tuple[int, int | None]:
+    """Where an element's contents begin, and their size; None when it was not known (a live recording)."""
+    length = 9 - head[place].bit_length() if place < len(head) else 9
+    if length > 8:
+        return place, None
+    unmarked = int.from_bytes(head[place : place + length], "big") - (1 << 7 * length)
+    return place + length, unmarked if unmarked != (1 << 7 * length) - 1 else None
+
+
+def _upright(frame: av.VideoFrame, pixel_aspect: Fraction | None) -> Frame:
+    """The picture as people see it.
+
+    What is transparent is white. Pixels that are not square are stretched, never shrunk. Phones store portrait videos
+    lying down, with a note how to turn them.
+
+    Args:
+        frame: as decoded.
+        pixel_aspect: width of a pixel divided by its height; None and nonsense count as 1.
+    """
+    if any(component.is_alpha for component in frame.format.components):
+        pixels = over_white(np.asarray(frame.to_ndarray(format="rgba"), np.uint8))
+    else:
+        pixels = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
+    if pixel_aspect and pixel_aspect != 1 and 1 / _MOST_STRETCHED <= pixel_aspect <= _MOST_STRETCHED:
+        height, width = pixels.shape[:2]
+        square = (round(width * max(1, pixel_aspect)), round(height * max(1, 1 / pixel_aspect)))
+        pixels = np.asarray(Image.fromarray(pixels).resize(square, Image.Resampling.BILINEAR))
     return np.ascontiguousarray(np.rot90(pixels, k=round(frame.rotation / 90)))
+
+
+def over_white(pixels: NDArray[np.uint8]) -> Frame:
+    """A picture with alpha, uint8 `[H, W, 4]`, on a white ground as browsers show it: uint8 `[H, W, 3]`."""
+    alpha = pixels[..., 3:].astype(np.uint16)
+    blended: Frame = ((pixels[..., :3] * alpha + 255 * (255 - alpha) + 127) // 255).astype(np.uint8)
+    return blended
+
+
+def _picture(picture: Image.Image) -> Frame:
+    """A still picture upright, transparent places white, 16 bits a pixel scaled to 8: uint8 `[H, W, 3]`."""
+    upright = ImageOps.exif_transpose(picture)
+    if upright.has_transparency_data:
+        return over_white(np.asarray(upright.convert("RGBA")))
+    if upright.mode.startswith("I"):  # otherwise all above 255 of 65535 would be white
+        upright = Image.fromarray((np.asarray(upright) >> 8).clip(0, 255).astype(np.uint8))
+    return np.asarray(upright.convert("RGB"))
 
 
 def _truncated(path: Path, count: int, promised: int, why: str) -> BootifolError:
