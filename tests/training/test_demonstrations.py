@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from bootifol.replay.buffer import ReplayBuffer
 from bootifol.training.budget import Budget, Counters
 from bootifol.training.cloning import cloning_due, one_cycle
 from bootifol.training.demonstrations import DemonstrationConfig, Demonstrations
-from bootifol.types import Arrays, Episode, FrameBatch, Frames, Metrics, Video, VideoSource
+from bootifol.types import Arrays, Batch, Episode, FrameBatch, Frames, Metrics, Video, VideoSource
 
 SIZE, STEPS, MOVES = 32, 12, 4
 CONFIG = DemonstrationConfig(share=0.5, batch_size=32)
@@ -101,7 +102,7 @@ def infer_all(demonstrations: Demonstrations, rng: np.random.Generator) -> None:
 def test_actions_and_rewards_of_the_videos_are_inferred() -> None:
     demonstrations, replay, rng = make_demonstrations(CONFIG), agent_steps(), np.random.default_rng(0)
     for _ in range(100):
-        demonstrations.learn_inverse_dynamics(replay, rng, 2e-3)
+        demonstrations.learn_inverse_dynamics(replay, 0, rng, 2e-3)
     infer_all(demonstrations, rng)
     everything = demonstrations.replay.sample(6 * STEPS, rng, transitions=np.arange(6 * STEPS))
     shown = everything.action.numpy().reshape(6, STEPS)
@@ -164,6 +165,30 @@ def test_cloning_phases_come_when_they_are_due(tmp_path: Path, demos: Path) -> N
     assert counters.cloning_updates == 4 + 2 * 2
     assert counters.cloning_began_at == 180
     assert counters.inferred_videos == 3 * 4
+
+
+@pytest.mark.parametrize(("policy_steps", "newest"), [(0, None), (30, 30), (10**9, 720)])
+def test_inverse_dynamics_prefers_steps_of_the_policy(
+    policy_steps: int, newest: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    demonstrations, replay = (
+        make_demonstrations(replace(CONFIG, batch_size=64, policy_share=0.5)),
+        agent_steps(),
+    )
+    drawn: list[np.ndarray] = []
+    sample = ReplayBuffer.sample
+
+    def watched(self: ReplayBuffer, *arguments: Any, **options: Any) -> Batch:
+        drawn.append(options["transitions"])
+        return sample(self, *arguments, **options)
+
+    monkeypatch.setattr(ReplayBuffer, "sample", watched)
+    demonstrations.learn_inverse_dynamics(replay, policy_steps, np.random.default_rng(0), 1e-3)
+    assert drawn[0].shape == (64,)
+    assert drawn[0].min() >= 0 and drawn[0].max() < len(replay)
+    if newest is not None:
+        assert (drawn[0][32:] >= len(replay) - newest).all()
+    assert (drawn[0][:32] < len(replay) - 30).any()
 
 
 def test_a_learning_rate_rises_and_falls_in_every_phase() -> None:

@@ -42,7 +42,7 @@ def cloning_phase(
     Args:
         agent: its encoder and actor are trained.
         demonstrations: the expert videos.
-        agent_replay: the agent's own steps, of its warm-up.
+        agent_replay: the agent's own steps.
         reward_model: rewards the expert videos.
         rng: draws batches and references.
         budget: a run whose time is over ends the phase.
@@ -65,7 +65,10 @@ def cloning_phase(
                 done.inverse_dynamics_updates, first.inverse_dynamics_updates, end.inverse_dynamics_updates
             )
             metrics = demonstrations.learn_inverse_dynamics(
-                agent_replay, rng, rate * config.inverse_dynamics_learning_rate
+                agent_replay,
+                counters.agent_steps - agent.config.warm_up_steps,
+                rng,
+                rate * config.inverse_dynamics_learning_rate,
             )
             counters.inverse_dynamics_updates += 1
         elif done.inferred_videos < end.inferred_videos:

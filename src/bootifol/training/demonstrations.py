@@ -46,6 +46,10 @@ class DemonstrationConfig:
     history_dropout: float = 0.8
     """Share of the observations drawn from expert videos whose stack repeats its newest frame."""
 
+    policy_share: float = 0.5
+    """Share of the inverse dynamics' batches from steps after the warm-up, as soon as there are any: the policy moves
+    more like the expert than random actions do. The rest comes from all steps."""
+
     inverse_dynamics_updates: int = 1500
     """Gradient steps of the inverse dynamics in the first Cloning Phase, when the agent's warm-up ends."""
 
@@ -74,7 +78,7 @@ class DemonstrationConfig:
     def __post_init__(self) -> None:
         if not 0 <= self.share < 1:
             raise BootifolError(f"demonstrations: share must be in [0, 1), not {self.share}")
-        for name in ("moving_share", "history_dropout", "repeat_share"):
+        for name in ("moving_share", "history_dropout", "policy_share", "repeat_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise BootifolError(f"demonstrations: {name} must be in [0, 1], not {getattr(self, name)}")
         names = ("videos", "inverse_dynamics_updates", "phases", "repeat_every", "batch_size")
@@ -125,10 +129,26 @@ class Demonstrations:
         return len(self.replay.episode_ids)
 
     def learn_inverse_dynamics(
-        self, agent_replay: ReplayBuffer, rng: np.random.Generator, learning_rate: float
+        self, agent_replay: ReplayBuffer, policy_steps: int, rng: np.random.Generator, learning_rate: float
     ) -> Metrics:
-        """One gradient step of the inverse dynamics on the agent's own steps."""
-        batch = agent_replay.sample(self.config.batch_size, rng, same_shift=True)
+        """One gradient step of the inverse dynamics on the agent's own steps.
+
+        Args:
+            agent_replay: all of them.
+            policy_steps: how many of them, the newest, came after the warm-up.
+            rng: draws the batch.
+            learning_rate: of Adam, for this step.
+        """
+        size, stored = self.config.batch_size, len(agent_replay)
+        newest = min(policy_steps, stored)
+        of_policy = round(self.config.policy_share * size) if newest > 0 else 0
+        drawn = np.concatenate(
+            [
+                rng.integers(0, stored, size - of_policy),
+                stored - 1 - rng.integers(0, max(newest, 1), of_policy),
+            ]
+        )
+        batch = agent_replay.sample(size, rng, same_shift=True, transitions=drawn)
         return self.inverse_dynamics.update(batch, learning_rate)
 
     def infer(self, index: int, reward_model: RewardModel, rng: np.random.Generator) -> None:
