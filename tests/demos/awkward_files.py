@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
@@ -82,13 +83,13 @@ def encode(
     """
     source = {3: "rgb24", 4: "rgba"}[frames.shape[-1]]
     with av.open(str(path), "w", options=container_options or {}) as container:
-        stream = container.add_stream(codec, rate=RATE, options=options or {})
+        stream: Any = container.add_stream(codec, rate=RATE, options=options or {})
         stream.height, stream.width = frames.shape[1:3]
         stream.pix_fmt = pixel_format
         stream.codec_context.thread_count = 1
         if aspect is not None:
             stream.codec_context.sample_aspect_ratio = aspect
-        voice = container.add_stream("aac", rate=8000) if sound else None
+        voice: Any = container.add_stream("aac", rate=8000) if sound else None
         for number, frame in enumerate(frames):
             picture = av.VideoFrame.from_ndarray(frame, format=source).reformat(format=pixel_format)
             picture.pts = number if times is None else times[number]
