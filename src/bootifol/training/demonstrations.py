@@ -120,7 +120,7 @@ class Demonstrations:
             steps = len(frames) - 1
             nothing = np.zeros((steps, action_dim), np.float32)
             replay.add(Episode(frames, nothing, expert[index], False), np.zeros(steps, np.float32))
-            moving.append(_moving(frames))
+            moving.append(moving_steps(frames))
         self._moving = np.flatnonzero(np.concatenate(moving))
         self._still = np.flatnonzero(~np.concatenate(moving))
 
@@ -207,7 +207,7 @@ class Demonstrations:
         return np.stack([resize(frame, self.frame_size) for frame in video.frames])
 
 
-def _moving(frames: Frames) -> NDArray[np.bool_]:
+def moving_steps(frames: Frames) -> NDArray[np.bool_]:
     """Whether the picture moves at each step of a video `[T + 1, S, S, 3]`, bool `[T]`."""
     change = np.abs(np.diff(frames.astype(np.int16), axis=0)).mean(axis=(1, 2, 3))
     moving: NDArray[np.bool_] = change > MOVING * change.max()
