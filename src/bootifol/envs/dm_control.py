@@ -37,8 +37,8 @@ class DMControlSimulator:
         self.action_dim = int(np.prod(specification.shape))
         self.step_seconds = float(self.environment.control_timestep())
         self._low, self._high = specification.minimum, specification.maximum
-        self._pictures = pictures
-        self._camera: Camera | None = None
+        # The suite's own pixels wrapper films every task with its first camera, too.
+        self._camera = Camera(self.physics.model.ptr, pictures.picture_size, pictures.profile, camera=0)
 
     @property
     def physics(self) -> Any:
@@ -62,12 +62,7 @@ class DMControlSimulator:
         return flat
 
     def render(self) -> Frame:
-        if self._camera is None:
-            # The suite's own pixels wrapper films every task with its first camera, too.
-            size, profile = self._pictures.picture_size, self._pictures.profile
-            self._camera = Camera(self.physics.model.ptr, size, profile, camera=0)
         return self._camera.picture(self.physics.data.ptr)
 
     def close(self) -> None:
-        if self._camera is not None:
-            self._camera.close()
+        self._camera.close()
