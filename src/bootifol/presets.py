@@ -10,6 +10,7 @@ from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.registry import RewardConfig
+from bootifol.rewards.virl.config import VirlConfig
 from bootifol.training.config import (
     AlignmentConfig,
     EvaluationConfig,
@@ -36,7 +37,14 @@ CPU = TrainingConfig(
             sequence_times=6,
             references=8,
             reward_scale="alignment",
-        )
+        ),
+        virl=VirlConfig(
+            width_divisor=4,
+            frames_per_video=4,
+            precision="bf16",
+            learning_rate=1e-3,
+            references=8,
+        ),
     ),
     agent=DrQv2Config(
         encoder="strided",
@@ -84,7 +92,10 @@ DEMO = replace(
 DRAWN = replace(
     CPU,
     pictures=PictureConfig(agent_size=32, video_size=32, stack=2),
-    reward=RewardConfig(replace(CPU.reward.bootifol, width_divisor=8)),
+    reward=RewardConfig(
+        replace(CPU.reward.bootifol, width_divisor=8),
+        virl=replace(CPU.reward.virl, width_divisor=8),
+    ),
     agent=replace(
         CPU.agent,
         hidden_dim=128,
@@ -116,7 +127,10 @@ with nothing cloned. The learning test runs it."""
 
 SMOKE = replace(
     CPU,
-    reward=RewardConfig(replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4)),
+    reward=RewardConfig(
+        replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4),
+        virl=replace(CPU.reward.virl, width_divisor=16, videos_per_class=4),
+    ),
     agent=replace(
         CPU.agent,
         hidden_dim=64,

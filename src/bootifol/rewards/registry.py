@@ -9,9 +9,12 @@ from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.rewards.environment import EnvironmentRewardModel
+from bootifol.rewards.virl.config import VirlConfig
+from bootifol.rewards.virl.model import VirlRewardModel
 
 METHODS = {
     "bootifol": "imitation from videos by bootstrapped contrastive learning (the paper)",
+    "virl": "siamese recurrent networks on raw videos, trained only while the agent acts (Berseth and Pal, 2019)",
     "environment": "the environment's own reward: an upper bound, not imitation",
 }
 """Every method and what it is."""
@@ -23,6 +26,9 @@ class RewardConfig:
 
     bootifol: BootifolConfig = field(default_factory=BootifolConfig)
     """BootIfOL's reward model."""
+
+    virl: VirlConfig = field(default_factory=VirlConfig)
+    """ViRL's reward model."""
 
 
 def make_reward_model(
@@ -42,6 +48,8 @@ def make_reward_model(
     """
     if method == "bootifol":
         return BootifolRewardModel(config.bootifol, video_size, seed, device)
+    if method == "virl":
+        return VirlRewardModel(config.virl, video_size, seed, device)
     if method == "environment":
         return EnvironmentRewardModel()
     raise BootifolError(f"there is no reward method {method!r}; choose one of {', '.join(METHODS)}")
