@@ -31,6 +31,10 @@ class VirlConfig:
     frame_reconstruction_weight: float = 0.1
     """lambda_4, weight of L_VAEI."""
 
+    distance: Literal["euclidean", "squared"] = "euclidean"
+    """d of both triplet losses. euclidean: the paper's. squared: the mean square over the dimensions, as in the public
+    release; near zero it hardly has a gradient, so it takes many more steps before it learns anything."""
+
     margin: float = 1.0
     """rho of both triplet losses."""
 

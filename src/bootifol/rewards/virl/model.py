@@ -117,8 +117,8 @@ class VirlRewardModel:
         by_video = pictures.view(count, length, *pictures.shape[1:])
         noisy = self._with_noise(by_video[self._indices(drawn.noisy)])
         with self._autocast():
-            encodings = self.networks.encode_frames(torch.cat([pictures, noisy.flatten(0, 1)]))
-        pool = encodings.view(-1, length, encodings.shape[1])
+            frames = self.networks.encode_frames(torch.cat([pictures, noisy.flatten(0, 1)]))
+        pool = frames.view(-1, length, frames.shape[1])
         anchor, positive, negative = (
             pool[:count],
             self._reordered(pool, *drawn.positive),
@@ -127,9 +127,13 @@ class VirlRewardModel:
         sequences = self.networks.encode_sequences(torch.cat([anchor, positive, negative]))
         h_anchor, h_positive, h_negative = (part[:, -1] for part in sequences.chunk(3))
 
+        compared = {
+            "sequence_triplet": (h_anchor, h_positive, h_negative),
+            "frame_triplet": (anchor, positive, negative),
+        }
         terms = {
-            "sequence_triplet": losses.siamese_loss(h_anchor, h_positive, h_negative, config.margin),
-            "frame_triplet": losses.siamese_loss(anchor, positive, negative, config.margin),
+            name: losses.siamese_loss(*encodings, config.margin, config.distance)
+            for name, encodings in compared.items()
         }
         decoded = self._indices(drawn.decoded)
         rows = torch.arange(count, device=self.device)[:, None]
