@@ -14,6 +14,18 @@ from bootifol.types import Video
 SMALL = VirlConfig(width_divisor=32, videos_per_class=3, learning_rate=1e-3, frames_per_video=4)
 
 
+LEARNING = replace(
+    SMALL,
+    videos_per_class=4,
+    frames_per_video=1,
+    altered_share=0.2,
+    early_ends=False,
+    frame_drop=0.0,
+    sequence_reconstruction_weight=0.0,
+)
+"""Few altered copies and whole videos: expert and agent differ in how they move alone, and 50 steps must do."""
+
+
 def make(config: VirlConfig = SMALL, seed: int = 0, size: int = SIZE) -> VirlRewardModel:
     return VirlRewardModel(config, size, seed)
 
@@ -26,11 +38,24 @@ def trained(steps: int, config: VirlConfig = SMALL) -> VirlRewardModel:
 
 
 def test_it_learns_while_the_agent_acts_and_only_then() -> None:
-    model = make()
+    model = make(LEARNING)
     before = model.state()
     assert list(model.align(EXPERT, OTHER)) == []
     assert all(np.array_equal(before[name], array) for name, array in model.state().items())
-    history = [model.update(EXPERT, OTHER) for _ in range(60)]
+    history = [model.update(EXPERT, OTHER) for _ in range(50)]
+    last = {name: float(np.mean([metrics[name] for metrics in history[-10:]])) for name in history[0]}
+    assert last["loss/sequence_triplet"] < 0.5 * history[0]["loss/sequence_triplet"]
+    assert last["distance/negative"] > 3 * last["distance/positive"]
+    expert, other = (
+        np.stack([model.label(source[i], [EXPERT[7]]) for i in range(4)]) for source in (EXPERT, OTHER)
+    )
+    assert expert.sum(1).mean() > other.sum(1).mean()
+    assert expert[:, -1].mean() > 0.75 * other[:, -1].mean()
+
+
+def test_both_reconstructions_get_better() -> None:
+    model = make()
+    history = [model.update(EXPERT, OTHER) for _ in range(16)]
     assert set(history[0]) == {
         "loss/sequence_triplet",
         "loss/frame_triplet",
@@ -41,16 +66,8 @@ def test_it_learns_while_the_agent_acts_and_only_then() -> None:
         "distance/positive",
         "distance/negative",
     }
-    last = {name: float(np.mean([metrics[name] for metrics in history[-15:]])) for name in history[0]}
-    assert last["loss/sequence_triplet"] < 0.8 * history[0]["loss/sequence_triplet"]
-    assert last["loss/frame_reconstruction"] < 0.5 * history[0]["loss/frame_reconstruction"]
-    assert last["loss/sequence_reconstruction"] < 0.5 * history[0]["loss/sequence_reconstruction"]
-    assert last["distance/negative"] > 2 * last["distance/positive"]
-    reward = {
-        source.name: float(np.mean([model.label(source[i], [EXPERT[7]]).sum() for i in range(4)]))
-        for source in (EXPERT, OTHER)
-    }
-    assert reward["expert"] > reward["other"]
+    for name in ("loss/frame_reconstruction", "loss/sequence_reconstruction"):
+        assert history[-1][name] < 0.6 * history[0][name]
 
 
 @pytest.mark.parametrize("precision", ["fp32", "bf16"])
