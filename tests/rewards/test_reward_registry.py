@@ -1,7 +1,11 @@
+import typing
+
 import numpy as np
 import pytest
 
+from bootifol.cli.train import train
 from bootifol.errors import BootifolError
+from bootifol.presets import PRESETS
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.registry import METHODS, RewardConfig, make_reward_model
@@ -17,6 +21,18 @@ def test_every_method_can_be_made(method: str) -> None:
     model.load_state(model.state())
     assert model.version == 0
     assert model.reads_environment_reward == (method == "environment")
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+def test_every_preset_has_every_method_at_its_size_of_pictures(name: str) -> None:
+    config = PRESETS[name]  # type: ignore[index]
+    for method in METHODS:
+        make_reward_model(method, config.reward, config.pictures.video_size, seed=0)
+
+
+def test_the_command_line_offers_every_method() -> None:
+    offered = typing.get_args(typing.get_type_hints(train)["method"])
+    assert list(offered) == list(METHODS)
 
 
 def test_unknown_methods_are_refused_with_the_known_ones() -> None:
