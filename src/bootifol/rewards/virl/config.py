@@ -40,7 +40,8 @@ class VirlConfig:
 
     altered_share: float = 0.5
     """Chance that an anchor's positive and negative are altered copies of itself; otherwise the positive is another
-    video of its class, and the negative one of the other class. The paper has both kinds and gives no share."""
+    video of its class, and the negative one of the other class. The paper's main text has both kinds and gives no
+    share."""
 
     noise: float = 0.05
     """Standard deviation of the noise added to a positive copy; pictures lie in [0, 1]."""

@@ -21,7 +21,7 @@ FEWEST_FRAMES = 4
 """Shorter videos have no order that could be spoiled."""
 
 CHANGED_FRAMES = 0.1
-"""Share of the frames that a positive copy swaps or shows twice; the paper gives none."""
+"""Share of the frames that a positive copy swaps or shows twice; the paper's main text gives none."""
 
 
 @dataclass(frozen=True)
