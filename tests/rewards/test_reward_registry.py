@@ -1,14 +1,21 @@
+import typing
+
 import numpy as np
 import pytest
 
+from bootifol.cli.train import train
 from bootifol.errors import BootifolError
+from bootifol.presets import PRESETS
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.registry import METHODS, RewardConfig, make_reward_model
+from bootifol.rewards.virl.config import VirlConfig
 from bootifol.types import Video
 
-CONFIG = RewardConfig(BootifolConfig(width_divisor=32), gaifo=GaifoConfig(width_divisor=32))
+CONFIG = RewardConfig(
+    BootifolConfig(width_divisor=32), virl=VirlConfig(width_divisor=32), gaifo=GaifoConfig(width_divisor=32)
+)
 
 
 @pytest.mark.parametrize("method", list(METHODS))
@@ -17,6 +24,18 @@ def test_every_method_can_be_made(method: str) -> None:
     model.load_state(model.state())
     assert model.version == 0
     assert model.reads_environment_reward == (method == "environment")
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+def test_every_preset_has_every_method_at_its_size_of_pictures(name: str) -> None:
+    config = PRESETS[name]  # type: ignore[index]
+    for method in METHODS:
+        make_reward_model(method, config.reward, config.pictures.video_size, seed=0)
+
+
+def test_the_command_line_offers_every_method() -> None:
+    offered = typing.get_args(typing.get_type_hints(train)["method"])
+    assert list(offered) == list(METHODS)
 
 
 def test_unknown_methods_are_refused_with_the_known_ones() -> None:

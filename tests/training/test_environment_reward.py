@@ -32,8 +32,8 @@ def nan_rewards(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     ("method", "config"),
-    [("bootifol", TINY), ("bootifol", WITH_DEMONSTRATIONS), ("gaifo", WITH_DEMONSTRATIONS)],
-    ids=["paper", "demonstrations", "gaifo"],
+    [("bootifol", TINY), ("bootifol", WITH_DEMONSTRATIONS), ("virl", TINY), ("gaifo", WITH_DEMONSTRATIONS)],
+    ids=["paper", "demonstrations", "virl", "gaifo"],
 )
 def test_nan_rewards_give_the_same_policy_bit_for_bit(
     tmp_path: Path, demos: Path, request: pytest.FixtureRequest, method: str, config: TrainingConfig

@@ -93,8 +93,8 @@ def next_actions(run: Run) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("method", "config"),
-    [("bootifol", TINY), ("bootifol", WITH_DEMONSTRATIONS), ("gaifo", WITH_DEMONSTRATIONS)],
-    ids=["paper", "demonstrations", "gaifo"],
+    [("bootifol", TINY), ("bootifol", WITH_DEMONSTRATIONS), ("virl", TINY), ("gaifo", WITH_DEMONSTRATIONS)],
+    ids=["paper", "demonstrations", "virl", "gaifo"],
 )
 def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
     tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch, method: str, config: TrainingConfig

@@ -25,6 +25,7 @@ TINY = replace(
     tensorboard=False,
     reward=RewardConfig(
         replace(SMOKE.reward.bootifol, width_divisor=32, videos_per_class=2),
+        virl=replace(SMOKE.reward.virl, width_divisor=32, videos_per_class=2),
         gaifo=replace(SMOKE.reward.gaifo, width_divisor=32, videos_per_class=2),
     ),
     agent=replace(

@@ -253,7 +253,7 @@ def _ranking_cards(run: RunFiles) -> list[Card]:
     cards = []
     for agent_steps in chosen:
         scores = scores_or_none(moments[agent_steps])
-        when = "Right after alignment" if agent_steps == 0 else f"After {thousands(agent_steps)} agent steps"
+        when = "Before the agent acted" if agent_steps == 0 else f"After {thousands(agent_steps)} agent steps"
         numbers = (
             ""
             if scores is None

@@ -21,7 +21,10 @@ class RewardModel(Protocol):
     """Counts the updates of the encoders; encodings computed under another version are stale."""
 
     def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
-        """Alignment Phase (Algorithm 1, first loop): endless; yields the metrics of one gradient step each time."""
+        """Alignment Phase (Algorithm 1, first loop): yields the metrics of one gradient step each time.
+
+        Endless, or empty for a method that learns only while the agent acts.
+        """
         ...
 
     def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:

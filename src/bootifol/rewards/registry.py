@@ -11,9 +11,12 @@ from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.rewards.environment import EnvironmentRewardModel
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.gaifo.model import GaifoRewardModel
+from bootifol.rewards.virl.config import VirlConfig
+from bootifol.rewards.virl.model import VirlRewardModel
 
 METHODS = {
     "bootifol": "imitation from videos by bootstrapped contrastive learning (the paper)",
+    "virl": "siamese recurrent networks on raw videos, trained only while the agent acts (Berseth and Pal, 2019)",
     "gaifo": "generative adversarial imitation from observation: a discriminator on three successive frames",
     "environment": "the environment's own reward: an upper bound, not imitation",
 }
@@ -26,6 +29,9 @@ class RewardConfig:
 
     bootifol: BootifolConfig = field(default_factory=BootifolConfig)
     """BootIfOL's reward model."""
+
+    virl: VirlConfig = field(default_factory=VirlConfig)
+    """ViRL's reward model."""
 
     gaifo: GaifoConfig = field(default_factory=GaifoConfig)
     """GAIfO's discriminator."""
@@ -48,6 +54,8 @@ def make_reward_model(
     """
     if method == "bootifol":
         return BootifolRewardModel(config.bootifol, video_size, seed, device)
+    if method == "virl":
+        return VirlRewardModel(config.virl, video_size, seed, device)
     if method == "gaifo":
         return GaifoRewardModel(config.gaifo, video_size, seed, device)
     if method == "environment":

@@ -8,7 +8,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from bootifol.errors import BootifolError
 from bootifol.networks.color import lab_views
 from bootifol.rewards.bootifol import losses
 from bootifol.rewards.bootifol.config import BootifolConfig
@@ -16,9 +15,9 @@ from bootifol.rewards.bootifol.networks import BootifolNetworks
 from bootifol.rewards.bootifol.sampling import Draw, draw
 from bootifol.rewards.bootifol.scale import DistanceScale
 from bootifol.rewards.bootifol.spoiled import spoiled
-from bootifol.rewards.checked_videos import checked_videos
-from bootifol.rewards.gradient_step import statistics_kept_if_refused, take_step
+from bootifol.rewards.gradient_step import GradientStep
 from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
+from bootifol.rewards.video_checks import check_references, checked_videos
 from bootifol.types import Arrays, FrameBatch, Frames, Metrics, Rewards, Video, VideoSource
 
 
@@ -64,18 +63,8 @@ class BootifolRewardModel:
 
         Encodings of the references are kept until the encoders change.
         """
-        if not 1 <= len(references) <= self.reference_count:
-            raise BootifolError(
-                f"the reward model compares with 1 to {self.reference_count} reference videos, but was given "
-                f"{len(references)}"
-            )
+        check_references(video, references, self.reference_count)
         length = len(video.frames)
-        for reference in references:
-            if len(reference.frames) < length:
-                raise BootifolError(
-                    f"the expert video {reference.name} has {len(reference.frames)} frames, fewer than the {length} of "
-                    f"{video.name}; record longer expert videos or use shorter episodes"
-                )
         missing = {item.name: item.frames for item in references if item.name not in self._encodings}
         fresh = self._encode([video.frames, *missing.values()])
         self._encodings.update(zip(missing, fresh[1:], strict=True))
@@ -119,18 +108,18 @@ class BootifolRewardModel:
     def _step(self, expert: VideoSource, other: VideoSource, scaling: bool) -> Metrics:
         """Algorithm 1: sample n and n videos, evaluate L, optimize theta, gamma, omega, phi."""
         n = self.config.videos_per_class
-        expert_videos = checked_videos(expert.sample(n, self._rng), self.video_size)
-        other_videos = checked_videos(other.sample(n, self._rng), self.video_size)
+        expert_videos = self._checked(expert.sample(n, self._rng))
+        other_videos = self._checked(other.sample(n, self._rng))
         spoiled_count = int(self.config.spoiled_share * n)
         length = min(expert_videos.shape[1], other_videos.shape[1])
         videos = np.concatenate([expert_videos[:, :length], other_videos[:, :length]])
         if spoiled_count:
-            shown = checked_videos(expert.sample(spoiled_count, self._rng), self.video_size)
+            shown = self._checked(expert.sample(spoiled_count, self._rng))
             videos[-spoiled_count:] = spoiled(shown[:, :length], self._rng)
         drawn = draw(self.config, 2 * n, length, self._rng)
-        with statistics_kept_if_refused(self.networks):
-            total, metrics, distances = self._losses(videos[:, drawn.kept], drawn)
-            take_step(self.networks, self._optimizer, total, metrics, self.version)
+        step = GradientStep(self.networks, self._optimizer, self.version + 1)
+        total, metrics, distances = self._losses(videos[:, drawn.kept], drawn)
+        step.take(total, metrics)
         self.version += 1
         self._encodings.clear()
         if scaling:
@@ -206,7 +195,7 @@ class BootifolRewardModel:
 
     def _encode(self, videos: Sequence[Frames]) -> list[torch.Tensor]:
         """Encodings `[T + 1, 128]` of each video, in evaluation mode: a frame's state depends on that frame alone."""
-        frames = np.concatenate([checked_videos(video[None], self.video_size)[0] for video in videos])
+        frames = np.concatenate([self._checked(video[None])[0] for video in videos])
         self.networks.eval()
         try:
             with torch.inference_mode():
@@ -237,3 +226,6 @@ class BootifolRewardModel:
 
     def _indices(self, indices: NDArray[np.int64]) -> torch.Tensor:
         return torch.from_numpy(indices.reshape(-1)).to(self.device)
+
+    def _checked(self, videos: FrameBatch) -> FrameBatch:
+        return checked_videos(videos, self.video_size)

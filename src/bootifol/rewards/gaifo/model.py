@@ -8,13 +8,13 @@ import numpy as np
 import torch
 
 from bootifol.errors import BootifolError
-from bootifol.rewards.checked_videos import checked_videos
 from bootifol.rewards.gaifo import losses
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.gaifo.networks import Discriminator
 from bootifol.rewards.gaifo.stacks import as_pictures, draw_stacks, stack_frames
-from bootifol.rewards.gradient_step import statistics_kept_if_refused, take_step
+from bootifol.rewards.gradient_step import GradientStep
 from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
+from bootifol.rewards.video_checks import checked_videos
 from bootifol.types import Arrays, FrameBatch, Metrics, Rewards, Video, VideoSource
 
 LABEL_BATCH = 256
@@ -114,9 +114,9 @@ class GaifoRewardModel:
             draw_stacks(of_class[:, :length], self.config.stacks_per_video, self.config.stack, self._rng)
             for of_class in videos
         ]
-        with statistics_kept_if_refused(self.discriminator):
-            loss, metrics = self._loss(*stacks)
-            take_step(self.discriminator, self._optimizer, loss, metrics, self.version)
+        step = GradientStep(self.discriminator, self._optimizer, self.version + 1)
+        loss, metrics = self._loss(*stacks)
+        step.take(loss, metrics)
         self.version += 1
         return metrics
 
