@@ -16,6 +16,8 @@ from bootifol.rewards.bootifol.networks import BootifolNetworks
 from bootifol.rewards.bootifol.sampling import Draw, draw
 from bootifol.rewards.bootifol.scale import DistanceScale
 from bootifol.rewards.bootifol.spoiled import spoiled
+from bootifol.rewards.checks import check_references, checked_videos
+from bootifol.rewards.gradient_step import gradient_step
 from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
 from bootifol.types import Arrays, FrameBatch, Frames, Metrics, Rewards, Video, VideoSource
 
@@ -62,18 +64,8 @@ class BootifolRewardModel:
 
         Encodings of the references are kept until the encoders change.
         """
-        if not 1 <= len(references) <= self.reference_count:
-            raise BootifolError(
-                f"the reward model compares with 1 to {self.reference_count} reference videos, but was given "
-                f"{len(references)}"
-            )
+        check_references(video, references, self.reference_count)
         length = len(video.frames)
-        for reference in references:
-            if len(reference.frames) < length:
-                raise BootifolError(
-                    f"the expert video {reference.name} has {len(reference.frames)} frames, fewer than the {length} of "
-                    f"{video.name}; record longer expert videos or use shorter episodes"
-                )
         missing = {item.name: item.frames for item in references if item.name not in self._encodings}
         fresh = self._encode([video.frames, *missing.values()])
         self._encodings.update(zip(missing, fresh[1:], strict=True))
@@ -117,29 +109,23 @@ class BootifolRewardModel:
     def _step(self, expert: VideoSource, other: VideoSource, scaling: bool) -> Metrics:
         """Algorithm 1: sample n and n videos, evaluate L, optimize theta, gamma, omega, phi."""
         n = self.config.videos_per_class
-        expert_videos = self._checked(expert.sample(n, self._rng))
-        other_videos = self._checked(other.sample(n, self._rng))
+        expert_videos = checked_videos(expert.sample(n, self._rng), self.video_size)
+        other_videos = checked_videos(other.sample(n, self._rng), self.video_size)
         spoiled_count = int(self.config.spoiled_share * n)
         length = min(expert_videos.shape[1], other_videos.shape[1])
         videos = np.concatenate([expert_videos[:, :length], other_videos[:, :length]])
         if spoiled_count:
-            shown = self._checked(expert.sample(spoiled_count, self._rng))
+            shown = checked_videos(expert.sample(spoiled_count, self._rng), self.video_size)
             videos[-spoiled_count:] = spoiled(shown[:, :length], self._rng)
         drawn = draw(self.config, 2 * n, length, self._rng)
         statistics = [buffer.clone() for buffer in self.networks.buffers()]
-        self._optimizer.zero_grad(set_to_none=True)
         total, metrics, distances = self._losses(videos[:, drawn.kept], drawn)
         try:
-            _refuse_if_not_finite(metrics["loss/total"], self.version, metrics)
-            total.backward()  # type: ignore[no-untyped-call]
-            gradients = [p.grad for p in self.networks.parameters() if p.grad is not None]
-            norm = float(torch.nn.utils.get_total_norm(gradients))
-            _refuse_if_not_finite(norm, self.version, {**metrics, "gradient norm": norm})
+            gradient_step(self.networks, self._optimizer, total, metrics, self.version + 1)
         except BootifolError:
             for buffer, good in zip(self.networks.buffers(), statistics, strict=True):
                 buffer.copy_(good)
             raise
-        self._optimizer.step()
         self.version += 1
         self._encodings.clear()
         if scaling:
@@ -215,7 +201,7 @@ class BootifolRewardModel:
 
     def _encode(self, videos: Sequence[Frames]) -> list[torch.Tensor]:
         """Encodings `[T + 1, 128]` of each video, in evaluation mode: a frame's state depends on that frame alone."""
-        frames = np.concatenate([self._checked(video[None])[0] for video in videos])
+        frames = np.concatenate([checked_videos(video[None], self.video_size)[0] for video in videos])
         self.networks.eval()
         try:
             with torch.inference_mode():
@@ -246,22 +232,3 @@ class BootifolRewardModel:
 
     def _indices(self, indices: NDArray[np.int64]) -> torch.Tensor:
         return torch.from_numpy(indices.reshape(-1)).to(self.device)
-
-    def _checked(self, videos: FrameBatch) -> FrameBatch:
-        size = self.video_size
-        if videos.ndim != 5 or videos.dtype != np.uint8 or videos.shape[2:] != (size, size, 3):
-            raise BootifolError(
-                f"the reward model reads uint8 videos of {size}x{size} RGB frames, but was given {videos.dtype} "
-                f"{list(videos.shape[1:])}; record or import the videos at that size"
-            )
-        return videos
-
-
-def _refuse_if_not_finite(value: float, version: int, metrics: Metrics) -> None:
-    """Raises before a bad step is taken, so the parameters stay as they were."""
-    if not np.isfinite(value):
-        named = ", ".join(f"{name} {number:.4g}" for name, number in metrics.items())
-        raise BootifolError(
-            f"the reward model's loss is not a finite number at its gradient step {version + 1} ({named}); the step "
-            "was not taken: go on from the last checkpoint with a smaller learning rate"
-        )
