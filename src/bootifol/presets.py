@@ -9,6 +9,7 @@ from bootifol.agents.drqv2 import DrQv2Config
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.registry import RewardConfig
 from bootifol.training.config import (
     AlignmentConfig,
@@ -36,7 +37,15 @@ CPU = TrainingConfig(
             sequence_times=6,
             references=8,
             reward_scale="alignment",
-        )
+        ),
+        context_translation=ContextTranslationConfig(
+            width_divisor=4,
+            pairs=8,
+            frames_per_pair=8,
+            precision="bf16",
+            learning_rate=1e-3,
+            reward_unit="expert",
+        ),
     ),
     agent=DrQv2Config(
         encoder="strided",
@@ -84,7 +93,10 @@ DEMO = replace(
 DRAWN = replace(
     CPU,
     pictures=PictureConfig(agent_size=32, video_size=32, stack=2),
-    reward=RewardConfig(replace(CPU.reward.bootifol, width_divisor=8)),
+    reward=RewardConfig(
+        replace(CPU.reward.bootifol, width_divisor=8),
+        context_translation=replace(CPU.reward.context_translation, width_divisor=8),
+    ),
     agent=replace(
         CPU.agent,
         hidden_dim=128,
@@ -116,7 +128,10 @@ with nothing cloned. The learning test runs it."""
 
 SMOKE = replace(
     CPU,
-    reward=RewardConfig(replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4)),
+    reward=RewardConfig(
+        replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4),
+        context_translation=replace(CPU.reward.context_translation, width_divisor=16, pairs=4),
+    ),
     agent=replace(
         CPU.agent,
         hidden_dim=64,

@@ -8,10 +8,13 @@ from bootifol.errors import BootifolError
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
+from bootifol.rewards.context_translation.config import ContextTranslationConfig
+from bootifol.rewards.context_translation.model import ContextTranslationRewardModel
 from bootifol.rewards.environment import EnvironmentRewardModel
 
 METHODS = {
     "bootifol": "imitation from videos by bootstrapped contrastive learning (the paper)",
+    "context_translation": "imitation from observation by context translation (Liu, Gupta, Abbeel, Levine, 2018)",
     "environment": "the environment's own reward: an upper bound, not imitation",
 }
 """Every method and what it is."""
@@ -23,6 +26,9 @@ class RewardConfig:
 
     bootifol: BootifolConfig = field(default_factory=BootifolConfig)
     """BootIfOL's reward model."""
+
+    context_translation: ContextTranslationConfig = field(default_factory=ContextTranslationConfig)
+    """The reward model of context translation."""
 
 
 def make_reward_model(
@@ -42,6 +48,8 @@ def make_reward_model(
     """
     if method == "bootifol":
         return BootifolRewardModel(config.bootifol, video_size, seed, device)
+    if method == "context_translation":
+        return ContextTranslationRewardModel(config.context_translation, video_size, seed, device)
     if method == "environment":
         return EnvironmentRewardModel()
     raise BootifolError(f"there is no reward method {method!r}; choose one of {', '.join(METHODS)}")
