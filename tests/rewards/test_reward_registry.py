@@ -4,10 +4,13 @@ import pytest
 from bootifol.errors import BootifolError
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.registry import METHODS, RewardConfig, make_reward_model
 from bootifol.types import Video
 
-CONFIG = RewardConfig(BootifolConfig(width_divisor=32))
+CONFIG = RewardConfig(
+    BootifolConfig(width_divisor=32), context_translation=ContextTranslationConfig(width_divisor=32)
+)
 
 
 @pytest.mark.parametrize("method", list(METHODS))
@@ -19,7 +22,7 @@ def test_every_method_can_be_made(method: str) -> None:
 
 
 def test_unknown_methods_are_refused_with_the_known_ones() -> None:
-    with pytest.raises(BootifolError, match="no reward method 'gail'; choose one of bootifol, environment"):
+    with pytest.raises(BootifolError, match=f"no reward method 'gail'; choose one of {', '.join(METHODS)}"):
         make_reward_model("gail", CONFIG, 32, seed=0)
 
 

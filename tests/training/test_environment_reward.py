@@ -30,16 +30,20 @@ def nan_rewards(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(components, "make_environment", lambda *arguments: NaNReward(make(*arguments)))
 
 
-@pytest.mark.parametrize("config", [TINY, WITH_DEMONSTRATIONS], ids=["paper", "demonstrations"])
+@pytest.mark.parametrize(
+    ("method", "config"),
+    [("bootifol", TINY), ("bootifol", WITH_DEMONSTRATIONS), ("context_translation", TINY)],
+    ids=["paper", "demonstrations", "context_translation"],
+)
 def test_nan_rewards_give_the_same_policy_bit_for_bit(
-    tmp_path: Path, demos: Path, request: pytest.FixtureRequest, config: TrainingConfig
+    tmp_path: Path, demos: Path, request: pytest.FixtureRequest, method: str, config: TrainingConfig
 ) -> None:
-    usual = new_run(tmp_path / "usual", demos, config=config)
+    usual = new_run(tmp_path / "usual", demos, method, config)
     assert usual.learn()
     request.getfixturevalue("nan_rewards")
-    poisoned = new_run(tmp_path / "poisoned", demos, config=config)
+    poisoned = new_run(tmp_path / "poisoned", demos, method, config)
     assert np.isnan(play_episode(poisoned.environment, poisoned.interactive._act, 1, "x").environment_return)
-    poisoned = new_run(tmp_path / "again", demos, config=config)
+    poisoned = new_run(tmp_path / "again", demos, method, config)
     assert poisoned.learn()
     for name, component in usual.components.stateful().items():
         theirs = poisoned.components.stateful()[name].state()

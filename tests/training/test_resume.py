@@ -91,16 +91,20 @@ def next_actions(run: Run) -> np.ndarray:
     return np.stack([run.components.agent.act(observation, 240, explore=True) for _ in range(3)])
 
 
-@pytest.mark.parametrize("config", [TINY, WITH_DEMONSTRATIONS], ids=["paper", "demonstrations"])
+@pytest.mark.parametrize(
+    ("method", "config"),
+    [("bootifol", TINY), ("bootifol", WITH_DEMONSTRATIONS), ("context_translation", TINY)],
+    ids=["paper", "demonstrations", "context_translation"],
+)
 def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
-    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch, config: TrainingConfig
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch, method: str, config: TrainingConfig
 ) -> None:
-    whole = new_run(tmp_path / "whole", demos, config=config)
+    whole = new_run(tmp_path / "whole", demos, method, config)
     assert whole.learn()
 
     with monkeypatch.context() as patch:
         signal_at(patch, signal.SIGTERM, episode=4)
-        assert not new_run(tmp_path / "parts", demos, config=config).learn()
+        assert not new_run(tmp_path / "parts", demos, method, config).learn()
     rest = resumed(tmp_path / "parts")
     assert rest.counters.episodes == 5
     assert rest.learn()

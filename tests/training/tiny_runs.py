@@ -23,7 +23,10 @@ TINY = replace(
     pictures=PICTURES,
     threads=1,
     tensorboard=False,
-    reward=RewardConfig(replace(SMOKE.reward.bootifol, width_divisor=32, videos_per_class=2)),
+    reward=RewardConfig(
+        replace(SMOKE.reward.bootifol, width_divisor=32, videos_per_class=2),
+        context_translation=replace(SMOKE.reward.context_translation, width_divisor=32, references=2),
+    ),
     agent=replace(
         SMOKE.agent,
         encoder="strided",

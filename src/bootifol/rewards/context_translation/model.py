@@ -16,8 +16,8 @@ from bootifol.rewards.gradient_step import gradient_step
 from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
 from bootifol.types import Arrays, FrameBatch, Metrics, Rewards, Video, VideoSource
 
-MEMORY = 0.98
-"""The cost of expert frames is averaged exponentially over about the last 50 gradient steps."""
+MEMORY = 0.9
+"""The cost of expert frames is averaged exponentially over about the last 10 gradient steps, for it falls quickly."""
 
 
 class ContextTranslationRewardModel:
