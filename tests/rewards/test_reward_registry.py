@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from bootifol.errors import BootifolError
+from bootifol.presets import PRESETS, PresetName
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
@@ -19,6 +20,14 @@ def test_every_method_can_be_made(method: str) -> None:
     model.load_state(model.state())
     assert model.version == 0
     assert model.reads_environment_reward == (method == "environment")
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+@pytest.mark.parametrize("method", list(METHODS))
+def test_every_preset_suits_every_method(method: str, name: PresetName) -> None:
+    config = PRESETS[name]
+    model = make_reward_model(method, config.reward, config.pictures.video_size, seed=0)
+    assert model.reference_count >= (method != "environment")
 
 
 def test_unknown_methods_are_refused_with_the_known_ones() -> None:

@@ -103,6 +103,20 @@ LOSSES = {
         "The contrast that makes the reward. Healthy: falls in alignment, and rises again while interacting, "
         "because the agent's videos come to look like the expert's. At 0 it teaches nothing more.",
     ),
+    "loss/translation": (
+        "L_trans: expert videos in another's context",
+        "Squared error of the translated frame. Healthy: falls, rests while all translations are one blurred picture, "
+        "and falls again.",
+    ),
+    "loss/reconstruction": (
+        "L_rec: features can be drawn",
+        "Squared error of a frame drawn from its own features. Healthy: falls with L_trans; equal to it, features "
+        "say nothing yet.",
+    ),
+    "loss/alignment": (
+        "L_align: translated and true features agree",
+        "What makes their distance a reward. Healthy: rises when features begin to say something, then falls.",
+    ),
     "loss/total": (
         "All losses together",
         "The weighted sum that is minimized. Healthy: falls in alignment and has no sudden jumps afterwards.",
