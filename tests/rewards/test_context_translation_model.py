@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from array_videos import ArrayVideos
 
 from bootifol.errors import BootifolError
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
@@ -16,27 +17,17 @@ SMALL = ContextTranslationConfig(
 )
 
 
-class BlockVideos:
+class BlockVideos(ArrayVideos):
     """A bright block that moves right, at a height of each video's own, or (`jumps`) anywhere at any time."""
 
     def __init__(self, name: str, jumps: bool, seed: int, count: int = 24) -> None:
         rng = np.random.default_rng(seed)
-        self.name = name
-        self.videos = np.full((count, FRAMES, SIZE, SIZE, 3), 20, np.uint8)
+        super().__init__(name, np.full((count, FRAMES, SIZE, SIZE, 3), 20, np.uint8))
         for video in self.videos:
             height = int(rng.integers(12))
             for t, frame in enumerate(video):
                 x, y = rng.integers(12, size=2) if jumps and t else (t, height)
                 frame[y : y + 5, x : x + 5] = (250, 120, 30)
-
-    def __len__(self) -> int:
-        return len(self.videos)
-
-    def __getitem__(self, index: int) -> Video:
-        return Video(f"{self.name}-{index}", self.videos[index])
-
-    def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
-        return self.videos[rng.choice(len(self.videos), count, replace=False)]
 
 
 EXPERT = BlockVideos("expert", jumps=False, seed=7)
