@@ -8,13 +8,17 @@ from bootifol.errors import BootifolError
 from bootifol.presets import PRESETS
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.registry import METHODS, RewardConfig, make_reward_model
 from bootifol.rewards.virl.config import VirlConfig
 from bootifol.types import Video
 
 CONFIG = RewardConfig(
-    BootifolConfig(width_divisor=32), virl=VirlConfig(width_divisor=32), gaifo=GaifoConfig(width_divisor=32)
+    BootifolConfig(width_divisor=32),
+    VirlConfig(width_divisor=32),
+    ContextTranslationConfig(width_divisor=32),
+    GaifoConfig(width_divisor=32),
 )
 
 

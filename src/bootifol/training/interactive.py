@@ -121,8 +121,9 @@ class InteractivePhase:
             return
         if self.budget.scheduled_steps(self.counters) > self.config.reward_updates_until:
             return
+        version = self.reward_model.version
         self.averages.add(self.reward_model.update(self.expert, self.agent_videos))
-        self.counters.reward_updates += 1
+        self.counters.reward_updates += self.reward_model.version - version
         if self.reward_model.reads_environment_reward:
             return  # true rewards do not go stale
         for _ in range(self.config.relabel_episodes):
