@@ -61,15 +61,15 @@ def test_label_rewards_the_logit_of_the_stack_that_ends_at_the_next_frame() -> N
     video = OTHER[0]
     for kind in ("softplus", "log_sigmoid", "logit"):
         model = aligned(3, replace(SMALL, reward=kind))
-        model.discriminator.eval()
+        model.networks.eval()
         expected = []
         for t in range(FRAMES - 1):
             stack = [video.frames[max(t - 1, 0)], video.frames[t], video.frames[t + 1]]
             channels = np.concatenate(stack, axis=2).transpose(2, 0, 1)[None] / np.float32(255)
             with torch.no_grad():
-                logit = model.discriminator(torch.from_numpy(channels))
+                logit = model.networks(torch.from_numpy(channels))
             expected.append(losses.reward(logit, kind).item())
-        model.discriminator.train()
+        model.networks.train()
         rewards = model.label(video, [])
         assert rewards.dtype == np.float32 and rewards.shape == (FRAMES - 1,)
         np.testing.assert_allclose(rewards, expected, rtol=1e-3, atol=1e-5)
@@ -133,7 +133,7 @@ def test_seeds_decide_everything() -> None:
 def test_a_loss_that_is_not_finite_takes_no_step() -> None:
     model = aligned(2)
     with torch.no_grad():
-        model.discriminator.pointwise[-1].bias[0] = np.nan
+        model.networks.pointwise[-1].bias[0] = np.nan
     before = model.state()
     with pytest.raises(BootifolError, match=r"not a finite number at its gradient step 3.*last checkpoint"):
         model.update(EXPERT, OTHER)

@@ -26,14 +26,19 @@ class GradientStep:
         self._statistics = [buffer.clone() for buffer in module.buffers()]
         optimizer.zero_grad(set_to_none=True)
 
-    def take(self, loss: torch.Tensor, metrics: Metrics) -> None:
+    def take(self, loss: torch.Tensor, metrics: Metrics) -> Metrics:
         """Follows the gradient of `loss`.
 
+        Returns:
+            The metrics and, as `loss/total`, the loss.
+
         Raises:
-            BootifolError: the loss or its gradient is not finite; nothing has changed then. Names the `metrics`.
+            BootifolError: the loss or its gradient is not finite; nothing has changed then. Names the metrics.
         """
+        total = float(loss.detach())
+        metrics = {**metrics, "loss/total": total}
         try:
-            self._refuse_if_not_finite(float(loss.detach()), metrics)
+            self._refuse_if_not_finite(total, metrics)
             loss.backward()  # type: ignore[no-untyped-call]
             gradients = [p.grad for p in self._module.parameters() if p.grad is not None]
             norm = float(torch.nn.utils.get_total_norm(gradients))
@@ -43,6 +48,7 @@ class GradientStep:
                 buffer.copy_(good)
             raise
         self._optimizer.step()
+        return metrics
 
     def _refuse_if_not_finite(self, value: float, metrics: Metrics) -> None:
         if not np.isfinite(value):

@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from bootifol.rewards.context_translation import losses
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.context_translation.networks import ContextTranslationNetworks
-from bootifol.rewards.gradient_step import GradientStep
-from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
-from bootifol.rewards.video_checks import check_references, checked_videos
+from bootifol.rewards.learned import LearnedRewardModel
+from bootifol.rewards.video_checks import check_references
 from bootifol.types import Arrays, FrameBatch, Metrics, Rewards, Video, VideoSource
 
 MEMORY = 0.9
 """The cost of expert frames is averaged exponentially over about the last 10 gradient steps, for it falls quickly."""
 
 
-class ContextTranslationRewardModel:
+class ContextTranslationRewardModel(LearnedRewardModel[ContextTranslationConfig, ContextTranslationNetworks]):
     """Expert videos translated into the agent's context, and the distance of its frames to them.
 
     Args:
@@ -30,23 +29,11 @@ class ContextTranslationRewardModel:
         device: where to compute, as PyTorch names it.
     """
 
-    reads_environment_reward = False
-
     def __init__(
         self, config: ContextTranslationConfig, video_size: int, seed: int, device: str = "cpu"
     ) -> None:
-        self.config = config
-        self.video_size = video_size
-        self.device = torch.device(device)
+        super().__init__(ContextTranslationNetworks, config, video_size, seed, device)
         self.reference_count = config.references
-        self.version = 0
-        # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self.networks = ContextTranslationNetworks(config, video_size)
-        self.networks.to(self.device)
-        self._optimizer = torch.optim.Adam(self.networks.parameters(), lr=config.learning_rate, fused=True)
-        self._rng = np.random.default_rng(seed)
         self._expert_cost = 0.0
         """Of an expert frame against one translation; 0 before the first gradient step."""
 
@@ -63,10 +50,10 @@ class ContextTranslationRewardModel:
         """Minus `losses.imitation_cost` of frames 1 ... T; the context is the video's own frame 0."""
         check_references(video, references, self.reference_count)
         length = len(video.frames)
-        frames = [checked_videos(shown.frames[None, :length], self.video_size)[0] for shown in references]
-        pictures = self._pictures(checked_videos(video.frames[None], self.video_size)[0])
+        frames = [self._checked(shown.frames[:length]) for shown in references]
+        pictures = self._pictures(self._checked(video.frames))
         networks, config = self.networks, self.config
-        with torch.inference_mode(), self._autocast():
+        with self._evaluating(), self._autocast():
             context, skips = networks.context_encoder(pictures[:1])
             context = context.expand(length - 1, -1)
             skips = [skip.expand(length - 1, -1, -1, -1) for skip in skips]
@@ -90,33 +77,21 @@ class ContextTranslationRewardModel:
         return rewards
 
     def state(self) -> Arrays:
-        """Parameters, Adam, random state, version and the cost of expert frames."""
-        return {
-            **module_state(self.networks, self._optimizer),
-            "random": generator_array(self._rng),
-            "version": np.array([self.version], dtype=np.int64),
-            "expert_cost": np.array([self._expert_cost], dtype=np.float64),
-        }
+        """What every reward model has, and the cost of expert frames."""
+        return {**super().state(), "expert_cost": np.array([self._expert_cost], dtype=np.float64)}
 
     def load_state(self, arrays: Arrays) -> None:
-        """Takes over what `state` gave; goes on bit for bit as that model would.
-
-        Raises:
-            BootifolError: an array is missing or has another shape (the run had another configuration).
-        """
-        load_module_state(self.networks, self._optimizer, arrays)
-        load_generator(self._rng, arrays["random"])
-        self.version = int(arrays["version"][0])
+        """The inverse of `state`."""
+        super().load_state(arrays)
         self._expert_cost = float(arrays["expert_cost"][0])
 
     def _step(self, expert: VideoSource) -> Metrics:
         """One gradient step on frames of the same moments of two expert videos each."""
         config = self.config
-        videos = checked_videos(expert.sample(2 * config.pairs, self._rng), self.video_size)
+        videos = self._sample(expert, 2 * config.pairs)
         moments = self._rng.integers(videos.shape[1], size=(config.pairs, config.frames_per_pair))
-        step = GradientStep(self.networks, self._optimizer, self.version + 1)
-        loss, metrics = self._losses(videos[: config.pairs], videos[config.pairs :], moments)
-        step.take(loss, metrics)
+        step = self._begin_step()
+        metrics = step.take(*self._losses(videos[: config.pairs], videos[config.pairs :], moments))
         cost = metrics["cost/expert"]
         self._expert_cost = MEMORY * self._expert_cost + (1 - MEMORY) * cost if self.version else cost
         self.version += 1
@@ -156,12 +131,9 @@ class ContextTranslationRewardModel:
         with torch.no_grad():
             cost = losses.imitation_cost(features, translated, wanted, pictures, config.image_weight).mean()
         metrics = {f"loss/{name}": float(term.detach()) for name, term in terms.items()}
-        return total, {**metrics, "loss/total": float(total.detach()), "cost/expert": float(cost)}
+        return total, {**metrics, "cost/expert": float(cost)}
 
     def _pictures(self, frames: NDArray[np.uint8]) -> torch.Tensor:
         """uint8 `[N, H, W, 3]` to float32 `[N, 3, H, W]` in [-1, 1]."""
         # Channels come last in memory, which the convolutions keep.
         return torch.from_numpy(frames).to(self.device).permute(0, 3, 1, 2).float() / 127.5 - 1
-
-    def _autocast(self) -> torch.autocast:
-        return torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.precision == "bf16")

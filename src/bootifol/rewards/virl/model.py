@@ -8,9 +8,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from bootifol.rewards.gradient_step import GradientStep
-from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
-from bootifol.rewards.video_checks import check_references, checked_videos
+from bootifol.rewards.learned import LearnedRewardModel
+from bootifol.rewards.video_checks import check_references
 from bootifol.rewards.virl import losses
 from bootifol.rewards.virl.config import VirlConfig
 from bootifol.rewards.virl.networks import VirlNetworks
@@ -22,7 +21,7 @@ PAIR = 2
 reconstructed once and counted twice."""
 
 
-class VirlRewardModel:
+class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
     """A distance between videos, learned by siamese networks while the agent acts.
 
     Args:
@@ -32,21 +31,9 @@ class VirlRewardModel:
         device: where to compute, as PyTorch names it.
     """
 
-    reads_environment_reward = False
-
     def __init__(self, config: VirlConfig, video_size: int, seed: int, device: str = "cpu") -> None:
-        self.config = config
-        self.video_size = video_size
-        self.device = torch.device(device)
+        super().__init__(VirlNetworks, config, video_size, seed, device)
         self.reference_count = config.references
-        self.version = 0
-        # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self.networks = VirlNetworks(config, video_size)
-        self.networks.to(self.device)
-        self._optimizer = torch.optim.Adam(self.networks.parameters(), lr=config.learning_rate, fused=True)
-        self._rng = np.random.default_rng(seed)
         self._encodings: dict[str, tuple[torch.Tensor, torch.Tensor]] = {}
 
     def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
@@ -56,14 +43,12 @@ class VirlRewardModel:
     def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:
         """One gradient step of L (Eq. 4) on n expert videos and n of the agent."""
         n = self.config.videos_per_class
-        expert_videos = checked_videos(expert.sample(n, self._rng), self.video_size)
-        agent_videos = checked_videos(agent.sample(n, self._rng), self.video_size)
+        expert_videos, agent_videos = self._sample(expert, n), self._sample(agent, n)
         length = min(expert_videos.shape[1], agent_videos.shape[1])
         drawn = draw(self.config, length, self._rng)
         videos = np.concatenate([expert_videos[:, drawn.kept], agent_videos[:, drawn.kept]])
-        step = GradientStep(self.networks, self._optimizer, self.version + 1)
-        total, metrics = self._losses(videos, drawn)
-        step.take(total, metrics)
+        step = self._begin_step()
+        metrics = step.take(*self._losses(videos, drawn))
         self.version += 1
         self._encodings.clear()
         return metrics
@@ -90,23 +75,9 @@ class VirlRewardModel:
         encodings: NDArray[np.float32] = torch.cat(self._encode(frames), dim=1).numpy()
         return encodings
 
-    def state(self) -> Arrays:
-        """Parameters, BatchNorm statistics, Adam, random state and version."""
-        return {
-            **module_state(self.networks, self._optimizer),
-            "random": generator_array(self._rng),
-            "version": np.array([self.version], dtype=np.int64),
-        }
-
     def load_state(self, arrays: Arrays) -> None:
-        """Takes over what `state` gave; goes on bit for bit as that model would.
-
-        Raises:
-            BootifolError: an array is missing or has another shape (the run had another configuration).
-        """
-        load_module_state(self.networks, self._optimizer, arrays)
-        load_generator(self._rng, arrays["random"])
-        self.version = int(arrays["version"][0])
+        """The inverse of `state`."""
+        super().load_state(arrays)
         self._encodings.clear()
 
     def _losses(self, videos: FrameBatch, drawn: Draw) -> tuple[torch.Tensor, Metrics]:
@@ -155,7 +126,6 @@ class VirlRewardModel:
             }
         return total, {
             **{f"loss/{name}": float(term.detach()) for name, term in terms.items()},
-            "loss/total": float(total.detach()),
             **{f"distance/{name}": float(distance.mean()) for name, distance in distances.items()},
         }
 
@@ -181,15 +151,10 @@ class VirlRewardModel:
 
     def _encode(self, frames: Frames) -> tuple[torch.Tensor, torch.Tensor]:
         """e and h, each `[T + 1, 128]`, in evaluation mode: a frame's e depends on that frame alone."""
-        checked_videos(frames[None], self.video_size)
-        self.networks.eval()
-        try:
-            with torch.inference_mode():
-                with self._autocast():
-                    encodings = self.networks.encode_frames(self._pictures(frames))
-                return encodings.cpu(), self.networks.encode_sequences(encodings[None])[0].cpu()
-        finally:
-            self.networks.train()
+        with self._evaluating():
+            with self._autocast():
+                encodings = self.networks.encode_frames(self._pictures(self._checked(frames)))
+            return encodings.cpu(), self.networks.encode_sequences(encodings[None])[0].cpu()
 
     def _pictures(self, frames: Frames) -> torch.Tensor:
         """uint8 `[N, H, W, 3]` to `[N, 3, H, W]` in [0, 1], channels last in memory."""
@@ -200,9 +165,6 @@ class VirlRewardModel:
         """Videos `[k, T' + 1, 3, H, W]` with Gaussian noise on every number."""
         noise = torch.from_numpy(self._rng.standard_normal(tuple(pictures.shape), dtype=np.float32))
         return pictures + self.config.noise * noise.to(pictures)
-
-    def _autocast(self) -> torch.autocast:
-        return torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.precision == "bf16")
 
     def _indices(self, indices: NDArray[np.int64]) -> torch.Tensor:
         return torch.from_numpy(indices).to(self.device)
