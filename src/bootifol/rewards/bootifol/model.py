@@ -30,6 +30,8 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         device: where to compute, as PyTorch names it.
     """
 
+    keeps_learning = False
+
     def __init__(self, config: BootifolConfig, video_size: int, seed: int, device: str = "cpu") -> None:
         super().__init__(BootifolNetworks, config, video_size, seed, device)
         self.reference_count = config.references

@@ -29,6 +29,8 @@ class ContextTranslationRewardModel(LearnedRewardModel[ContextTranslationConfig,
         device: where to compute, as PyTorch names it.
     """
 
+    keeps_learning = False
+
     def __init__(
         self, config: ContextTranslationConfig, video_size: int, seed: int, device: str = "cpu"
     ) -> None:

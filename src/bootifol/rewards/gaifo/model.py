@@ -29,6 +29,7 @@ class GaifoRewardModel(LearnedRewardModel[GaifoConfig, Discriminator]):
         device: where to compute, as PyTorch names it.
     """
 
+    keeps_learning = True
     reference_count = 0
 
     def __init__(self, config: GaifoConfig, video_size: int, seed: int, device: str = "cpu") -> None:

@@ -31,6 +31,8 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
         device: where to compute, as PyTorch names it.
     """
 
+    keeps_learning = True
+
     def __init__(self, config: VirlConfig, video_size: int, seed: int, device: str = "cpu") -> None:
         super().__init__(VirlNetworks, config, video_size, seed, device)
         self.reference_count = config.references
