@@ -2,10 +2,11 @@ import typing
 
 import numpy as np
 import pytest
+from dot_videos import DotVideos
 
 from bootifol.cli.train import train
 from bootifol.errors import BootifolError
-from bootifol.presets import PRESETS
+from bootifol.presets import PRESETS, PresetName
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
@@ -28,13 +29,17 @@ def test_every_method_can_be_made(method: str) -> None:
     model.load_state(model.state())
     assert model.version == 0
     assert model.reads_environment_reward == (method == "environment")
+    assert model.keeps_learning == (method in ("virl", "gaifo"))
 
 
 @pytest.mark.parametrize("name", list(PRESETS))
-def test_every_preset_has_every_method_at_its_size_of_pictures(name: str) -> None:
-    config = PRESETS[name]  # type: ignore[index]
-    for method in METHODS:
-        make_reward_model(method, config.reward, config.pictures.video_size, seed=0)
+@pytest.mark.parametrize("method", [method for method in METHODS if method != "environment"])
+def test_every_preset_rewards_videos_of_its_size_by_every_method(method: str, name: PresetName) -> None:
+    config, size = PRESETS[name], PRESETS[name].pictures.video_size
+    model = make_reward_model(method, config.reward, size, seed=0)
+    expert, agent = DotVideos("expert", False, 10, size, 5), DotVideos("agent", True, 1, size, 5)
+    rewards = model.label(agent[0], [expert[index] for index in range(model.reference_count)])
+    assert rewards.shape == (4,) and np.isfinite(rewards).all()
 
 
 def test_the_command_line_offers_every_method() -> None:

@@ -9,7 +9,6 @@ from bootifol.errors import BootifolError
 from bootifol.rewards.virl.config import VirlConfig
 from bootifol.rewards.virl.model import VirlRewardModel
 from bootifol.rewards.virl.networks import SequenceDecoder
-from bootifol.types import Video
 
 SMALL = VirlConfig(width_divisor=32, videos_per_class=3, learning_rate=1e-3, frames_per_video=4)
 EXPERT = DotVideos("expert", jumps=False)
@@ -152,100 +151,23 @@ def test_several_references_are_averaged() -> None:
     np.testing.assert_allclose(several.label(OTHER[0], references), each.mean(0), rtol=1e-5)
 
 
-@pytest.mark.parametrize("precision", ["fp32", "bf16"])
-def test_future_frames_leave_past_rewards_untouched(precision: str) -> None:
-    model = trained(2, replace(SMALL, precision=precision))
-    before = model.label(OTHER[0], [EXPERT[0]])
-    for changed in (1, 6, FRAMES - 1):
-        frames = OTHER[0].frames.copy()
-        frames[changed] = 255 - frames[changed]
-        after = model.label(Video("changed", frames), [EXPERT[0]])
-        np.testing.assert_array_equal(after[: changed - 1], before[: changed - 1])
-        assert after[changed - 1] != before[changed - 1]
-
-
-def test_labeling_changes_nothing_and_encodes_references_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_references_are_encoded_once_for_each_version(monkeypatch: pytest.MonkeyPatch) -> None:
     model = trained(1)
-    before = model.state()
     encoded: list[int] = []
     encode = model._encode
     monkeypatch.setattr(model, "_encode", lambda frames: encoded.append(len(frames)) or encode(frames))
     first = model.label(OTHER[0], [EXPERT[0]])
     np.testing.assert_array_equal(model.label(OTHER[0], [EXPERT[0]]), first)
     assert len(encoded) == 3
-    after = model.state()
-    assert all(np.array_equal(before[name], after[name]) for name in before)
     model.update(EXPERT, OTHER)
     assert model.version == 2
     assert not np.array_equal(model.label(OTHER[0], [EXPERT[0]]), first)
     assert len(encoded) == 5
 
 
-def test_resumed_training_is_bit_for_bit_the_uninterrupted_one() -> None:
-    config = replace(SMALL, precision="bf16")
-    straight, stopped, resumed = trained(4, config), trained(2, config), make(config, seed=99)
-    resumed.load_state({name: array.copy() for name, array in stopped.state().items()})
-    for _ in range(2):
-        resumed.update(EXPERT, OTHER)
-    assert resumed.version == straight.version == 4
-    one, two = straight.state(), resumed.state()
-    assert one.keys() == two.keys()
-    for name, array in one.items():
-        np.testing.assert_array_equal(array, two[name], err_msg=name)
-    np.testing.assert_array_equal(resumed.label(OTHER[0], [EXPERT[0]]), straight.label(OTHER[0], [EXPERT[0]]))
-
-
-def test_state_is_a_copy_and_seeds_decide_everything() -> None:
-    model = trained(1)
-    state = model.state()
-    copies = {name: array.copy() for name, array in state.items()}
-    model.update(EXPERT, OTHER)
-    assert all(np.array_equal(state[name], copies[name]) for name in state)
-    torch.manual_seed(12345)  # whatever the global generator holds
-    again = trained(1).state()
-    assert all(np.array_equal(again[name], copies[name]) for name in copies)
-    name = "network/sequence_decoder.input.weight"
-    assert not np.array_equal(make(seed=1).state()[name], make(seed=0).state()[name])
-
-
-def test_a_state_of_another_configuration_is_refused() -> None:
-    with pytest.raises(BootifolError, match="does not fit its configuration"):
-        make(replace(SMALL, width_divisor=16)).load_state(make().state())
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_loss_that_is_not_finite_takes_no_step(bad: float) -> None:
-    model = trained(2)
-    with torch.no_grad():
-        model.networks.frame_decoder.strided[-1].bias[0] = bad
-    before = model.state()
-    with pytest.raises(BootifolError, match=r"not a finite number at its gradient step 3.*last checkpoint"):
-        model.update(EXPERT, OTHER)
-    after = model.state()
-    for name in before:
-        if name != "random":
-            np.testing.assert_array_equal(before[name], after[name], err_msg=name)
-
-
-def test_videos_of_the_paper_size() -> None:
-    expert, other = DotVideos("e", False, 3, 64, 8), DotVideos("o", True, 3, 64, 8)
-    model = make(size=64)
-    model.update(expert, other)
-    assert model.label(other[0], [expert[0]]).shape == (7,)
-
-
-def test_mistakes_are_refused_with_a_sentence() -> None:
-    model = make()
-    with pytest.raises(BootifolError, match="reads uint8 videos of 32x32 RGB frames"):
-        model.label(Video("large", np.zeros((5, 64, 64, 3), np.uint8)), [Video("as large", EXPERT[0].frames)])
-    with pytest.raises(BootifolError, match="compares with 1 to 1 reference videos, but was given 0"):
-        model.label(OTHER[0], [])
-    with pytest.raises(BootifolError, match="short has 5 frames, fewer than the 12 of other-0"):
-        model.label(OTHER[0], [Video("short", EXPERT[0].frames[:5])])
-    with pytest.raises(BootifolError, match="uint8 videos of 32x32"):
-        model.update(DotVideos("large", False, 3, 64), OTHER)
+def test_videos_too_short_to_be_altered_are_refused() -> None:
     with pytest.raises(BootifolError, match="use longer videos"):
-        model.update(DotVideos("short", False, 3, frames=3), OTHER)
+        make().update(DotVideos("short", False, 3, frames=3), OTHER)
 
 
 @pytest.mark.parametrize(
