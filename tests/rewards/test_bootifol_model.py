@@ -169,10 +169,10 @@ def test_frames_per_video_leaves_the_sequence_losses_on_all_frames() -> None:
     ],
 )
 def test_bad_configurations_are_refused_with_a_sentence(field: str, value: float) -> None:
-    with pytest.raises(BootifolError, match=field):
+    with pytest.raises(BootifolError, match=f"bootifol: {field} is"):
         replace(BootifolConfig(), **{field: value})
 
 
 def test_scaled_cosine_is_refused() -> None:
-    with pytest.raises(BootifolError, match="reward_scale"):
+    with pytest.raises(BootifolError, match="bootifol: reward_scale"):
         BootifolConfig(reward="cosine", reward_scale="alignment")

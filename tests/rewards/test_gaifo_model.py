@@ -128,5 +128,5 @@ def test_mistakes_are_refused_with_a_sentence() -> None:
     ],
 )
 def test_bad_configurations_are_refused_with_a_sentence(field: str, value: object) -> None:
-    with pytest.raises(BootifolError, match=f"{field} must be"):
+    with pytest.raises(BootifolError, match=f"gaifo: {field} is"):
         replace(GaifoConfig(), **{field: value})
