@@ -98,10 +98,11 @@ class BootifolConfig:
         for field in ("temperature", "soft_min_temperature", "learning_rate"):
             if not getattr(self, field) > 0:
                 raise BootifolError(f"bootifol: {field} is {getattr(self, field)}, but must be above 0")
-        for field in ("multiview", "triplet", "autoencoder", "prediction", "sequence"):
-            if not getattr(self, f"{field}_weight") >= 0:
+        for loss in ("multiview", "triplet", "autoencoder", "prediction", "sequence"):
+            field = f"{loss}_weight"
+            if not getattr(self, field) >= 0:
                 raise BootifolError(
-                    f"bootifol: {field}_weight is {getattr(self, f'{field}_weight')}; use 0 to leave the loss out"
+                    f"bootifol: {field} is {getattr(self, field)}; use 0 to leave the loss out"
                 )
         if self.videos_per_class < 2:
             raise BootifolError(
