@@ -9,8 +9,10 @@ from bootifol.agents.drqv2 import DrQv2Config
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.registry import RewardConfig
+from bootifol.rewards.virl.config import VirlConfig
 from bootifol.training.config import (
     AlignmentConfig,
     EvaluationConfig,
@@ -37,6 +39,21 @@ CPU = TrainingConfig(
             sequence_times=6,
             references=8,
             reward_scale="alignment",
+        ),
+        virl=VirlConfig(
+            width_divisor=4,
+            frames_per_video=4,
+            precision="bf16",
+            learning_rate=1e-3,
+            references=8,
+        ),
+        context_translation=ContextTranslationConfig(
+            width_divisor=4,
+            pairs=8,
+            frames_per_pair=8,
+            precision="bf16",
+            learning_rate=1e-3,
+            reward_unit="expert",
         ),
         gaifo=GaifoConfig(
             width_divisor=4, videos_per_class=16, stacks_per_video=4, precision="bf16", learning_rate=1e-3
@@ -88,6 +105,8 @@ DRAWN = replace(
     pictures=PictureConfig(agent_size=32, video_size=32, stack=2),
     reward=RewardConfig(
         replace(CPU.reward.bootifol, width_divisor=8),
+        virl=replace(CPU.reward.virl, width_divisor=8),
+        context_translation=replace(CPU.reward.context_translation, width_divisor=8),
         gaifo=replace(CPU.reward.gaifo, width_divisor=8),
     ),
     agent=replace(
@@ -123,6 +142,8 @@ SMOKE = replace(
     CPU,
     reward=RewardConfig(
         replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4),
+        virl=replace(CPU.reward.virl, width_divisor=16, videos_per_class=4),
+        context_translation=replace(CPU.reward.context_translation, width_divisor=16, pairs=4),
         gaifo=replace(CPU.reward.gaifo, width_divisor=16, videos_per_class=4),
     ),
     agent=replace(

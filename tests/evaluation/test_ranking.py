@@ -34,6 +34,7 @@ class BrightnessReward:
     """Rewards each step with minus the distance of the frame's brightness from the references'."""
 
     reads_environment_reward = False
+    keeps_learning = False
     version = 0
 
     def __init__(self, reference_count: int = 1) -> None:

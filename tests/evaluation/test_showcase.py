@@ -24,6 +24,7 @@ class TwoVideos:
 
 class NotingReward:
     reads_environment_reward = False
+    keeps_learning = False
     reference_count = 1
     version = 0
 

@@ -2,8 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
-from dot_videos import FRAMES, SIZE, DotVideos
+from dot_videos import SIZE, DotVideos
 
 from bootifol.errors import BootifolError
 from bootifol.rewards.bootifol.config import BootifolConfig
@@ -80,27 +79,6 @@ def test_cosine_reward() -> None:
     np.testing.assert_allclose(model.label(OTHER[0], [EXPERT[1]]), cosine, rtol=1e-4)
 
 
-@pytest.mark.parametrize("precision", ["fp32", "bf16"])
-def test_future_frames_leave_past_rewards_untouched(precision: str) -> None:
-    model = aligned(2, replace(SMALL, precision=precision))
-    before = model.label(OTHER[0], [EXPERT[0]])
-    for changed in (1, 6, FRAMES - 1):
-        frames = OTHER[0].frames.copy()
-        frames[changed] = 255 - frames[changed]
-        after = model.label(Video("changed", frames), [EXPERT[0]])
-        np.testing.assert_array_equal(after[: changed - 1], before[: changed - 1])
-        assert after[changed - 1] != before[changed - 1]
-
-
-def test_labeling_changes_nothing() -> None:
-    model = aligned(2)
-    before = model.state()
-    first = model.label(OTHER[0], [EXPERT[0]])
-    np.testing.assert_array_equal(model.label(OTHER[0], [EXPERT[0]]), first)
-    after = model.state()
-    assert all(np.array_equal(before[name], after[name]) for name in before)
-
-
 def test_references_are_encoded_once_for_each_version_of_the_encoders(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -170,79 +148,11 @@ def test_spoiled_share_of_the_others_is_drawn_from_the_expert() -> None:
         BootifolConfig(spoiled_share=1.0)
 
 
-def test_resumed_training_is_bit_for_bit_the_uninterrupted_one() -> None:
-    config = replace(SMALL, precision="bf16", frames_per_video=5, reward_scale="alignment")
-    straight = aligned(4, config)
-    stopped = aligned(2, config)
-    resumed = make(config, seed=99)
-    resumed.load_state({name: array.copy() for name, array in stopped.state().items()})
-    steps = resumed.align(EXPERT, OTHER)
-    next(steps)
-    next(steps)
-    assert resumed.version == straight.version == 4
-    one, two = straight.state(), resumed.state()
-    assert one.keys() == two.keys()
-    for name, array in one.items():
-        np.testing.assert_array_equal(array, two[name], err_msg=name)
-    np.testing.assert_array_equal(resumed.label(OTHER[0], [EXPERT[0]]), straight.label(OTHER[0], [EXPERT[0]]))
-
-
-def test_state_is_a_copy_and_seeds_decide_everything() -> None:
-    model = aligned(1)
-    state = model.state()
-    copies = {name: array.copy() for name, array in state.items()}
-    model.update(EXPERT, OTHER)
-    assert all(np.array_equal(state[name], copies[name]) for name in state)
-    torch.manual_seed(12345)  # whatever the global generator holds
-    again = aligned(1).state()
-    assert all(np.array_equal(again[name], copies[name]) for name in copies)
-    other_seed = make(seed=1).state()["network/sequence_encoder.output.weight"]
-    assert not np.array_equal(other_seed, make(seed=0).state()["network/sequence_encoder.output.weight"])
-
-
-def test_a_state_of_another_configuration_is_refused() -> None:
-    with pytest.raises(BootifolError, match="does not fit its configuration"):
-        make(replace(SMALL, width_divisor=16)).load_state(make().state())
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_loss_that_is_not_finite_takes_no_step(bad: float) -> None:
-    model = aligned(2)
-    with torch.no_grad():
-        model.networks.sequence_encoder.output.bias[0] = bad
-    before = model.state()
-    with pytest.raises(BootifolError, match=r"not a finite number at its gradient step 3.*last checkpoint"):
-        model.update(EXPERT, OTHER)
-    after = model.state()
-    for name in before:
-        if name != "random":
-            np.testing.assert_array_equal(before[name], after[name], err_msg=name)
-
-
 def test_frames_per_video_leaves_the_sequence_losses_on_all_frames() -> None:
     few = next(make(replace(SMALL, frames_per_video=3, frame_drop=0.0)).align(EXPERT, OTHER))
     every = next(make(replace(SMALL, frame_drop=0.0)).align(EXPERT, OTHER))
     assert few["loss/sequence"] == pytest.approx(every["loss/sequence"], rel=1e-4)
     assert few["loss/multiview"] < every["loss/multiview"]  # fewer frames, fewer negatives
-
-
-def test_videos_of_the_paper_size() -> None:
-    expert, other = DotVideos("e", False, 3, 64, 8), DotVideos("o", True, 3, 64, 8)
-    model = make(size=64)
-    next(model.align(expert, other))
-    assert model.label(other[0], [expert[0]]).shape == (7,)
-
-
-def test_mistakes_are_refused_with_a_sentence() -> None:
-    model = make()
-    with pytest.raises(BootifolError, match="reads uint8 videos of 32x32 RGB frames"):
-        model.label(Video("large", np.zeros((5, 64, 64, 3), np.uint8)), [EXPERT[0]])
-    with pytest.raises(BootifolError, match="compares with 1 to 1 reference videos, but was given 0"):
-        model.label(OTHER[0], [])
-    with pytest.raises(BootifolError, match="short has 5 frames, fewer than the 12 of other-0"):
-        model.label(OTHER[0], [Video("short", EXPERT[0].frames[:5])])
-    with pytest.raises(BootifolError, match="uint8 videos of 32x32"):
-        next(model.align(DotVideos("large", False, 3, 64), OTHER))
 
 
 @pytest.mark.parametrize(
@@ -259,10 +169,10 @@ def test_mistakes_are_refused_with_a_sentence() -> None:
     ],
 )
 def test_bad_configurations_are_refused_with_a_sentence(field: str, value: float) -> None:
-    with pytest.raises(BootifolError, match=field):
+    with pytest.raises(BootifolError, match=f"bootifol: {field} is"):
         replace(BootifolConfig(), **{field: value})
 
 
 def test_scaled_cosine_is_refused() -> None:
-    with pytest.raises(BootifolError, match="reward_scale"):
+    with pytest.raises(BootifolError, match="bootifol: reward_scale"):
         BootifolConfig(reward="cosine", reward_scale="alignment")

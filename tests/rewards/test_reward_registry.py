@@ -1,14 +1,26 @@
+import typing
+
 import numpy as np
 import pytest
+from dot_videos import DotVideos
 
+from bootifol.cli.train import train
 from bootifol.errors import BootifolError
+from bootifol.presets import PRESETS, PresetName
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.registry import METHODS, RewardConfig, make_reward_model
+from bootifol.rewards.virl.config import VirlConfig
 from bootifol.types import Video
 
-CONFIG = RewardConfig(BootifolConfig(width_divisor=32), gaifo=GaifoConfig(width_divisor=32))
+CONFIG = RewardConfig(
+    BootifolConfig(width_divisor=32),
+    VirlConfig(width_divisor=32),
+    ContextTranslationConfig(width_divisor=32),
+    GaifoConfig(width_divisor=32),
+)
 
 
 @pytest.mark.parametrize("method", list(METHODS))
@@ -17,6 +29,22 @@ def test_every_method_can_be_made(method: str) -> None:
     model.load_state(model.state())
     assert model.version == 0
     assert model.reads_environment_reward == (method == "environment")
+    assert model.keeps_learning == (method in ("virl", "gaifo"))
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+@pytest.mark.parametrize("method", [method for method in METHODS if method != "environment"])
+def test_every_preset_rewards_videos_of_its_size_by_every_method(method: str, name: PresetName) -> None:
+    config, size = PRESETS[name], PRESETS[name].pictures.video_size
+    model = make_reward_model(method, config.reward, size, seed=0)
+    expert, agent = DotVideos("expert", False, 10, size, 5), DotVideos("agent", True, 1, size, 5)
+    rewards = model.label(agent[0], [expert[index] for index in range(model.reference_count)])
+    assert rewards.shape == (4,) and np.isfinite(rewards).all()
+
+
+def test_the_command_line_offers_every_method() -> None:
+    offered = typing.get_args(typing.get_type_hints(train)["method"])
+    assert list(offered) == list(METHODS)
 
 
 def test_unknown_methods_are_refused_with_the_known_ones() -> None:

@@ -58,6 +58,7 @@ class CountingReward:
     """Rewards a video with its number."""
 
     reads_environment_reward = False
+    keeps_learning = False
     reference_count = 1
     version = 0
 

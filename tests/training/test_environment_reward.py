@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from tiny_runs import TINY, WITH_DEMONSTRATIONS, new_run
+from tiny_runs import IMITATING_RUNS, WITH_DEMONSTRATIONS, new_run
 
 from bootifol.envs.rollout import play_episode
 from bootifol.errors import BootifolError
@@ -30,11 +30,7 @@ def nan_rewards(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(components, "make_environment", lambda *arguments: NaNReward(make(*arguments)))
 
 
-@pytest.mark.parametrize(
-    ("method", "config"),
-    [("bootifol", TINY), ("bootifol", WITH_DEMONSTRATIONS), ("gaifo", WITH_DEMONSTRATIONS)],
-    ids=["paper", "demonstrations", "gaifo"],
-)
+@pytest.mark.parametrize(("method", "config"), IMITATING_RUNS)
 def test_nan_rewards_give_the_same_policy_bit_for_bit(
     tmp_path: Path, demos: Path, request: pytest.FixtureRequest, method: str, config: TrainingConfig
 ) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_runs import TINY, WITH_DEMONSTRATIONS, new_run, resumed
+from tiny_runs import RUNS, WITH_DEMONSTRATIONS, new_run, resumed
 
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.errors import BootifolError
@@ -91,11 +91,7 @@ def next_actions(run: Run) -> np.ndarray:
     return np.stack([run.components.agent.act(observation, 240, explore=True) for _ in range(3)])
 
 
-@pytest.mark.parametrize(
-    ("method", "config"),
-    [("bootifol", TINY), ("bootifol", WITH_DEMONSTRATIONS), ("gaifo", WITH_DEMONSTRATIONS)],
-    ids=["paper", "demonstrations", "gaifo"],
-)
+@pytest.mark.parametrize(("method", "config"), RUNS)
 def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
     tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch, method: str, config: TrainingConfig
 ) -> None:

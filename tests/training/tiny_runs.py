@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from rich.console import Console
 
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.presets import SMOKE
-from bootifol.rewards.registry import RewardConfig
+from bootifol.rewards.registry import METHODS, RewardConfig
 from bootifol.training.config import AlignmentConfig, InteractiveConfig, TrainingConfig
 from bootifol.training.demonstrations import DemonstrationConfig
 from bootifol.training.run_config import RunConfig
@@ -25,6 +26,8 @@ TINY = replace(
     tensorboard=False,
     reward=RewardConfig(
         replace(SMOKE.reward.bootifol, width_divisor=32, videos_per_class=2),
+        virl=replace(SMOKE.reward.virl, width_divisor=32, videos_per_class=2),
+        context_translation=replace(SMOKE.reward.context_translation, width_divisor=32, references=2),
         gaifo=replace(SMOKE.reward.gaifo, width_divisor=32, videos_per_class=2),
     ),
     agent=replace(
@@ -66,6 +69,15 @@ WITH_DEMONSTRATIONS = replace(
     ),
 )
 """The same, starting as a clone of the expert videos."""
+
+RUNS = [
+    pytest.param("bootifol", TINY, id="paper"),
+    *(pytest.param(method, WITH_DEMONSTRATIONS, id=method) for method in METHODS),
+]
+"""Method and configuration of what must hold for every method: cloning asks the reward for more than acting does."""
+
+IMITATING_RUNS = [run for run in RUNS if run.id != "environment"]
+"""The same without the upper bound."""
 
 
 def record_demos(directory: Path) -> Path:

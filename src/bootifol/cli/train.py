@@ -26,7 +26,7 @@ def preset_of(words: list[str]) -> TrainingConfig:
 def train(
     config: Annotated[TrainingConfig, tyro.conf.arg(name="")],
     task: str = "reacher_hard",
-    method: Literal["bootifol", "gaifo", "environment"] = "bootifol",
+    method: Literal["bootifol", "virl", "context_translation", "gaifo", "environment"] = "bootifol",
     preset: PresetName = "cpu",
     demos: Path | None = None,
     out: Path | None = None,
@@ -40,8 +40,8 @@ def train(
         config: Every setting of the preset, which the flags below change one by one.
         task: The environment to act in: a name that `bootifol tasks` lists, gymnasium:ID, or MODULE:FUNCTION, which
             returns a Gymnasium environment.
-        method: bootifol and gaifo (a discriminator on three successive frames) learn their reward from the videos;
-            environment uses the true reward, as an upper bound.
+        method: bootifol, virl, context_translation and gaifo learn a reward from the videos; environment uses the true
+            reward, as an upper bound.
         preset: paper: its hyperparameters to the digit. cpu: 2 cores, within 3 hours. demo: what `make demo` runs, with
             a time budget of minutes. drawn: the tasks drawn with numpy, in two minutes. smoke: every stage, in under
             two minutes.

@@ -67,19 +67,27 @@ def strided_layers(
 
 
 class ViewEncoder(nn.Module):
-    """One of g_theta1, g_theta2: strided 5x5 convolutions, then two 1x1 convolutions.
+    """One of g_theta1, g_theta2, or a whole picture's encoder: strided 5x5 convolutions, then two 1x1 convolutions.
 
     The 1x1 convolutions see one pixel, so they are linear layers. Every layer but the last is followed by BatchNorm
     and LeakyReLU and has no bias of its own (the BatchNorm has one).
 
     Args:
-        channels: of the view, 1 for L and 2 for ab.
+        channels: of the view, 1 for L and 2 for ab; 3 for a whole picture.
         video_size: the picture's side in pixels.
         width_divisor: divides every hidden width; 1 is the paper's network.
         leak: slope of LeakyReLU below zero.
+        numbers: what a view is encoded into.
     """
 
-    def __init__(self, channels: int, video_size: int, width_divisor: int = 1, leak: float = 0.2) -> None:
+    def __init__(
+        self,
+        channels: int,
+        video_size: int,
+        width_divisor: int = 1,
+        leak: float = 0.2,
+        numbers: int = VIEW_SIZE,
+    ) -> None:
         super().__init__()
         hidden = HIDDEN_WIDTH // width_divisor
         self.strided, width = strided_layers(channels, video_size, width_divisor, leak)
@@ -87,11 +95,11 @@ class ViewEncoder(nn.Module):
             nn.Linear(width, hidden, bias=False),
             nn.BatchNorm1d(hidden),
             nn.LeakyReLU(leak),
-            nn.Linear(hidden, VIEW_SIZE),
+            nn.Linear(hidden, numbers),
         )
 
     def forward(self, view: torch.Tensor) -> torch.Tensor:
-        """`[N, C, H, W]` to `[N, 64]`."""
+        """`[N, C, H, W]` to `[N, numbers]`."""
         return cast(torch.Tensor, self.pointwise(self.strided(view).flatten(1)))
 
 

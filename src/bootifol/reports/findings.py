@@ -133,7 +133,7 @@ def _reward(run: RunFiles) -> Finding | None:
     first_steps, first = known[0]
     if first_steps != steps:
         before = f"{first.expert_above_half_good:.0%} and {first.half_good_above_random:.0%}"
-        text += f"; right after alignment it was {before}"
+        text += f"; before the agent acted it was {before}"
     weakest = min(last.expert_above_half_good, last.half_good_above_random)
     return Finding(_verdict(weakest, good=0.8, fair=0.6), text + ".")
 

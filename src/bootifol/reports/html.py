@@ -103,14 +103,46 @@ LOSSES = {
         "The contrast that makes the reward. Healthy: falls in alignment, and rises again while interacting, "
         "because the agent's videos come to look like the expert's. At 0 it teaches nothing more.",
     ),
+    "loss/sequence_triplet": (
+        "L_SNS: alike videos are near, others far",
+        "Distances between encodings of whole videos, which make the reward with those of frames. Healthy: starts at "
+        "1, since all encodings are nearly one, and falls clearly below it.",
+    ),
+    "loss/frame_triplet": (
+        "L_SNI: alike frames are near, others far",
+        "The same of single frames. Healthy: falls where a single frame tells expert from agent, and stays near 1 "
+        "where it does not.",
+    ),
+    "loss/sequence_reconstruction": (
+        "L_RAES: videos can be redrawn",
+        "Squared error of frames unrolled from the encoding of their video. Healthy: falls fast, then slowly.",
+    ),
+    "loss/frame_reconstruction": (
+        "L_VAEI: frames can be redrawn",
+        "Squared error of a frame redrawn from its own encoding. Healthy: falls fast, then slowly.",
+    ),
+    "loss/translation": (
+        "L_trans: videos shown in the context of another",
+        "Squared error of the translated frame. Healthy: falls, rests while all translations are one blurred picture, "
+        "and falls again.",
+    ),
+    "loss/reconstruction": (
+        "L_rec: features can be drawn",
+        "Squared error of a frame drawn from its own features. Healthy: falls with L_trans; equal to it, features "
+        "say nothing yet.",
+    ),
+    "loss/alignment": (
+        "L_align: translated and true features agree",
+        "What makes their distance a reward. Healthy: rises when features begin to say something, then falls.",
+    ),
     "loss/discriminator": (
-        "Discriminator (L_D of GAIfO)",
-        "The expert's stacks of frames told from others. Healthy: falls from 2 log 2 = 1.39; near 0 while the agent "
-        "acts, the discriminator has won and its reward says little.",
+        "L_D: expert and other stacks of frames are told apart",
+        "What the discriminator does not know yet. Healthy: falls from 2 log 2 = 1.39; near 0 while the agent acts, "
+        "the discriminator has won and its reward says little.",
     ),
     "loss/total": (
         "All losses together",
-        "The weighted sum that is minimized. Healthy: falls in alignment and has no sudden jumps afterwards.",
+        "The weighted sum that is minimized. Healthy: falls at first and has no sudden jumps afterwards.",
     ),
 }
 """Title and caption of each loss."""
@@ -253,7 +285,7 @@ def _ranking_cards(run: RunFiles) -> list[Card]:
     cards = []
     for agent_steps in chosen:
         scores = scores_or_none(moments[agent_steps])
-        when = "Right after alignment" if agent_steps == 0 else f"After {thousands(agent_steps)} agent steps"
+        when = "Before the agent acted" if agent_steps == 0 else f"After {thousands(agent_steps)} agent steps"
         numbers = (
             ""
             if scores is None

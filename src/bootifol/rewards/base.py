@@ -14,18 +14,29 @@ class RewardModel(Protocol):
     reads_environment_reward: bool
     """True only for the upper bound `environment`; otherwise the environment's reward never reaches a learner."""
 
+    keeps_learning: bool
+    """True where the method's own paper trains the reward until the run ends; False where it rests after N_train
+    agent steps, or never learns while the agent acts."""
+
     reference_count: int
     """How many expert videos `label` wants to compare an episode with (1 in the paper, 0 for none)."""
 
     version: int
-    """Counts the updates of the encoders; encodings computed under another version are stale."""
+    """Counts gradient steps; encodings and rewards computed under another version are stale."""
 
     def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
-        """Alignment Phase (Algorithm 1, first loop): endless; yields the metrics of one gradient step each time."""
+        """Alignment Phase (Algorithm 1, first loop): yields the metrics of one gradient step each time.
+
+        Endless, or empty for a method that learns only while the agent acts. `loss/total` among the metrics is what
+        the step made smaller, and every other `loss/…` a term of it.
+        """
         ...
 
     def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:
-        """Interactive Phase: one gradient step on expert videos and the agent's own."""
+        """Interactive Phase: one gradient step on expert videos and the agent's own.
+
+        No step, and no metrics, for a method that learns only before the agent acts.
+        """
         ...
 
     def label(self, video: Video, references: Sequence[Video]) -> Rewards:

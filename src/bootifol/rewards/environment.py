@@ -12,6 +12,7 @@ class EnvironmentRewardModel:
     """Learns nothing and passes on the true reward."""
 
     reads_environment_reward = True
+    keeps_learning = False
     reference_count = 0
     version = 0
 

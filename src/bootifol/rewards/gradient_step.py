@@ -1,9 +1,6 @@
-"""One gradient step of a reward model, taken only where loss and gradient are finite."""
+"""A gradient step that is taken whole or not at all."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import torch
@@ -13,46 +10,50 @@ from bootifol.errors import BootifolError
 from bootifol.types import Metrics
 
 
-@contextmanager
-def statistics_kept_if_refused(networks: nn.Module) -> Iterator[None]:
-    """Gives BatchNorm's statistics (all buffers) back as they were where the step inside is refused."""
-    statistics = [buffer.clone() for buffer in networks.buffers()]
-    try:
-        yield
-    except BootifolError:
-        for buffer, good in zip(networks.buffers(), statistics, strict=True):
-            buffer.copy_(good)
-        raise
-
-
-def take_step(
-    networks: nn.Module, optimizer: torch.optim.Optimizer, total: torch.Tensor, metrics: Metrics, version: int
-) -> None:
-    """Goes down the gradient of `total` once.
+class GradientStep:
+    """One step of an optimizer. Make it before the forward pass, whose normalization statistics it can undo.
 
     Args:
-        networks: whose parameters the optimizer holds.
-        optimizer: takes the step.
-        total: the loss, a scalar.
-        metrics: its terms, which the sentence of an error names.
-        version: steps taken before this one.
-
-    Raises:
-        BootifolError: the loss or its gradient is not finite; the parameters stay as they were.
+        module: what learns.
+        optimizer: of all its parameters.
+        number: of the step, from 1, for messages.
     """
-    _refuse_if_not_finite(float(total.detach()), version, metrics)
-    optimizer.zero_grad(set_to_none=True)
-    total.backward()  # type: ignore[no-untyped-call]
-    gradients = [p.grad for p in networks.parameters() if p.grad is not None]
-    norm = float(torch.nn.utils.get_total_norm(gradients))
-    _refuse_if_not_finite(norm, version, {**metrics, "gradient norm": norm})
-    optimizer.step()
 
+    def __init__(self, module: nn.Module, optimizer: torch.optim.Optimizer, number: int) -> None:
+        self._module = module
+        self._optimizer = optimizer
+        self._number = number
+        self._statistics = [buffer.clone() for buffer in module.buffers()]
+        optimizer.zero_grad(set_to_none=True)
 
-def _refuse_if_not_finite(value: float, version: int, metrics: Metrics) -> None:
-    if not np.isfinite(value):
-        named = ", ".join(f"{name} {number:.4g}" for name, number in metrics.items())
-        raise BootifolError(
-            f"the reward model's loss is not a finite number at its gradient step {version + 1} ({named}); the step "
-            "was not taken: go on from the last checkpoint with a smaller learning rate"
-        )
+    def take(self, loss: torch.Tensor, metrics: Metrics) -> Metrics:
+        """Follows the gradient of `loss`.
+
+        Returns:
+            The metrics and, as `loss/total`, the loss.
+
+        Raises:
+            BootifolError: the loss or its gradient is not finite; nothing has changed then. Names the metrics.
+        """
+        total = float(loss.detach())
+        metrics = {**metrics, "loss/total": total}
+        try:
+            self._refuse_if_not_finite(total, metrics)
+            loss.backward()  # type: ignore[no-untyped-call]
+            gradients = [p.grad for p in self._module.parameters() if p.grad is not None]
+            norm = float(torch.nn.utils.get_total_norm(gradients))
+            self._refuse_if_not_finite(norm, {**metrics, "gradient norm": norm})
+        except BootifolError:
+            for buffer, good in zip(self._module.buffers(), self._statistics, strict=True):
+                buffer.copy_(good)
+            raise
+        self._optimizer.step()
+        return metrics
+
+    def _refuse_if_not_finite(self, value: float, metrics: Metrics) -> None:
+        if not np.isfinite(value):
+            named = ", ".join(f"{name} {number:.4g}" for name, number in metrics.items())
+            raise BootifolError(
+                f"the reward model's loss is not a finite number at its gradient step {self._number} ({named}); the "
+                "step was not taken: go on from the last checkpoint with a smaller learning rate"
+            )

@@ -8,13 +8,19 @@ from bootifol.errors import BootifolError
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
+from bootifol.rewards.context_translation.config import ContextTranslationConfig
+from bootifol.rewards.context_translation.model import ContextTranslationRewardModel
 from bootifol.rewards.environment import EnvironmentRewardModel
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.gaifo.model import GaifoRewardModel
+from bootifol.rewards.virl.config import VirlConfig
+from bootifol.rewards.virl.model import VirlRewardModel
 
 METHODS = {
-    "bootifol": "imitation from videos by bootstrapped contrastive learning (the paper)",
-    "gaifo": "generative adversarial imitation from observation: a discriminator on three successive frames",
+    "bootifol": "contrastive learning, bootstrapped on the agent's own failures (Djeafea Sonwa et al., 2022)",
+    "virl": "siamese recurrent networks, trained only while the agent acts (Berseth and Pal, 2019)",
+    "context_translation": "expert videos translated into the agent's first frame (Liu et al., 2018)",
+    "gaifo": "a discriminator on three successive frames (Torabi, Warnell and Stone, 2018)",
     "environment": "the environment's own reward: an upper bound, not imitation",
 }
 """Every method and what it is."""
@@ -26,6 +32,12 @@ class RewardConfig:
 
     bootifol: BootifolConfig = field(default_factory=BootifolConfig)
     """BootIfOL's reward model."""
+
+    virl: VirlConfig = field(default_factory=VirlConfig)
+    """ViRL's reward model."""
+
+    context_translation: ContextTranslationConfig = field(default_factory=ContextTranslationConfig)
+    """The reward model of context translation."""
 
     gaifo: GaifoConfig = field(default_factory=GaifoConfig)
     """GAIfO's discriminator."""
@@ -48,6 +60,10 @@ def make_reward_model(
     """
     if method == "bootifol":
         return BootifolRewardModel(config.bootifol, video_size, seed, device)
+    if method == "virl":
+        return VirlRewardModel(config.virl, video_size, seed, device)
+    if method == "context_translation":
+        return ContextTranslationRewardModel(config.context_translation, video_size, seed, device)
     if method == "gaifo":
         return GaifoRewardModel(config.gaifo, video_size, seed, device)
     if method == "environment":

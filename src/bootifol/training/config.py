@@ -40,7 +40,8 @@ class InteractiveConfig:
     """N_update: agent steps between two gradient steps of the reward."""
 
     reward_updates_until: int = 375_000
-    """N_train: agent steps after which the reward is frozen."""
+    """N_train: agent steps after which the reward is frozen. Methods whose own paper trains the reward until the run
+    ends do so here too."""
 
     agent_videos: int = 5000
     """Capacity of D_a: how many of the agent's newest episodes the reward learns from."""

@@ -119,12 +119,14 @@ class InteractivePhase:
     def _update_reward(self) -> None:
         if self._warming_up or self.counters.agent_steps % self.config.reward_update_every:
             return
-        if self.budget.scheduled_steps(self.counters) > self.config.reward_updates_until:
+        resting = self.budget.scheduled_steps(self.counters) > self.config.reward_updates_until
+        if resting and not self.reward_model.keeps_learning:
             return
+        version = self.reward_model.version
         self.averages.add(self.reward_model.update(self.expert, self.agent_videos))
+        if self.reward_model.version == version:
+            return  # nothing was learned, so no stored reward is stale
         self.counters.reward_updates += 1
-        if self.reward_model.reads_environment_reward:
-            return  # true rewards do not go stale
         for _ in range(self.config.relabel_episodes):
             self._relabel_one()
 

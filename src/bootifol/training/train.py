@@ -143,6 +143,8 @@ class Run:
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()
+        if not self.counters.alignment_steps:
+            self.console.print("nothing to align: this method's reward learns nothing before the agent acts")
         self._rank()
         self._checkpoint()
         return True

@@ -94,34 +94,33 @@ class BootifolConfig:
     def __post_init__(self) -> None:
         for field in ("references", "sequence_times", "predicted_states", "window", "width_divisor"):
             if getattr(self, field) < 1:
-                raise BootifolError(
-                    f"reward model: {field} is {getattr(self, field)}, but must be at least 1"
-                )
+                raise BootifolError(f"bootifol: {field} is {getattr(self, field)}, but must be at least 1")
         for field in ("temperature", "soft_min_temperature", "learning_rate"):
             if not getattr(self, field) > 0:
-                raise BootifolError(f"reward model: {field} is {getattr(self, field)}, but must be above 0")
-        for field in ("multiview", "triplet", "autoencoder", "prediction", "sequence"):
-            if not getattr(self, f"{field}_weight") >= 0:
-                raise BootifolError(f"reward model: {field}_weight is negative; use 0 to leave the loss out")
+                raise BootifolError(f"bootifol: {field} is {getattr(self, field)}, but must be above 0")
+        for loss in ("multiview", "triplet", "autoencoder", "prediction", "sequence"):
+            field = f"{loss}_weight"
+            if not getattr(self, field) >= 0:
+                raise BootifolError(
+                    f"bootifol: {field} is {getattr(self, field)}; use 0 to leave the loss out"
+                )
         if self.videos_per_class < 2:
             raise BootifolError(
-                f"reward model: videos_per_class is {self.videos_per_class}, but L_O compares an expert video "
+                f"bootifol: videos_per_class is {self.videos_per_class}, but L_O compares an expert video "
                 "with another one, so it must be at least 2"
             )
         if not 0 <= self.spoiled_share < 1:
-            raise BootifolError(f"reward model: spoiled_share is {self.spoiled_share}, but must be in [0, 1)")
+            raise BootifolError(f"bootifol: spoiled_share is {self.spoiled_share}, but must be in [0, 1)")
         if not 0 <= self.frame_drop < 1:
-            raise BootifolError(f"reward model: frame_drop is {self.frame_drop}, but must be in [0, 1)")
+            raise BootifolError(f"bootifol: frame_drop is {self.frame_drop}, but must be in [0, 1)")
         if self.frames_per_video is not None and self.frames_per_video < 1:
             raise BootifolError(
-                f"reward model: frames_per_video is {self.frames_per_video}; use at least 1, or none for all"
+                f"bootifol: frames_per_video is {self.frames_per_video}; use at least 1, or none for all"
             )
         if self.width_divisor > 32:
-            raise BootifolError(
-                f"reward model: width_divisor is {self.width_divisor}, but must be at most 32"
-            )
+            raise BootifolError(f"bootifol: width_divisor is {self.width_divisor}, but must be at most 32")
         if self.reward_scale == "alignment" and self.reward == "cosine":
             raise BootifolError(
-                "reward model: reward_scale alignment is for the distance reward; the cosine lies in [-1, 1] already, "
+                "bootifol: reward_scale alignment is for the distance reward; the cosine lies in [-1, 1] already, "
                 "so use reward_scale none"
             )

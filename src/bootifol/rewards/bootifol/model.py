@@ -8,7 +8,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from bootifol.errors import BootifolError
 from bootifol.networks.color import lab_views
 from bootifol.rewards.bootifol import losses
 from bootifol.rewards.bootifol.config import BootifolConfig
@@ -16,13 +15,12 @@ from bootifol.rewards.bootifol.networks import BootifolNetworks
 from bootifol.rewards.bootifol.sampling import Draw, draw
 from bootifol.rewards.bootifol.scale import DistanceScale
 from bootifol.rewards.bootifol.spoiled import spoiled
-from bootifol.rewards.checked_videos import checked_videos
-from bootifol.rewards.gradient_step import statistics_kept_if_refused, take_step
-from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
+from bootifol.rewards.learned import LearnedRewardModel
+from bootifol.rewards.video_checks import check_references
 from bootifol.types import Arrays, FrameBatch, Frames, Metrics, Rewards, Video, VideoSource
 
 
-class BootifolRewardModel:
+class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
     """A distance between videos, learned from expert videos and others.
 
     Args:
@@ -32,21 +30,11 @@ class BootifolRewardModel:
         device: where to compute, as PyTorch names it.
     """
 
-    reads_environment_reward = False
+    keeps_learning = False
 
     def __init__(self, config: BootifolConfig, video_size: int, seed: int, device: str = "cpu") -> None:
-        self.config = config
-        self.video_size = video_size
-        self.device = torch.device(device)
+        super().__init__(BootifolNetworks, config, video_size, seed, device)
         self.reference_count = config.references
-        self.version = 0
-        # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self.networks = BootifolNetworks(config, video_size)
-        self.networks.to(self.device)
-        self._optimizer = torch.optim.Adam(self.networks.parameters(), lr=config.learning_rate, fused=True)
-        self._rng = np.random.default_rng(seed)
         self._scale = DistanceScale()
         self._encodings: dict[str, torch.Tensor] = {}
 
@@ -64,18 +52,8 @@ class BootifolRewardModel:
 
         Encodings of the references are kept until the encoders change.
         """
-        if not 1 <= len(references) <= self.reference_count:
-            raise BootifolError(
-                f"the reward model compares with 1 to {self.reference_count} reference videos, but was given "
-                f"{len(references)}"
-            )
+        check_references(video, references, self.reference_count)
         length = len(video.frames)
-        for reference in references:
-            if len(reference.frames) < length:
-                raise BootifolError(
-                    f"the expert video {reference.name} has {len(reference.frames)} frames, fewer than the {length} of "
-                    f"{video.name}; record longer expert videos or use shorter episodes"
-                )
         missing = {item.name: item.frames for item in references if item.name not in self._encodings}
         fresh = self._encode([video.frames, *missing.values()])
         self._encodings.update(zip(missing, fresh[1:], strict=True))
@@ -96,41 +74,29 @@ class BootifolRewardModel:
         return encoding
 
     def state(self) -> Arrays:
-        """Parameters, BatchNorm statistics, Adam, random state, version and reward scale."""
-        return {
-            **module_state(self.networks, self._optimizer),
-            "random": generator_array(self._rng),
-            "version": np.array([self.version], dtype=np.int64),
-            "reward_scale": self._scale.means.copy(),
-        }
+        """What every reward model has, and the reward scale."""
+        return {**super().state(), "reward_scale": self._scale.means.copy()}
 
     def load_state(self, arrays: Arrays) -> None:
-        """Takes over what `state` gave; goes on bit for bit as that model would.
-
-        Raises:
-            BootifolError: an array is missing or has another shape (the run had another configuration).
-        """
-        load_module_state(self.networks, self._optimizer, arrays)
-        load_generator(self._rng, arrays["random"])
-        self.version = int(arrays["version"][0])
+        """The inverse of `state`."""
+        super().load_state(arrays)
         self._scale.means = arrays["reward_scale"].astype(np.float64)
         self._encodings.clear()
 
     def _step(self, expert: VideoSource, other: VideoSource, scaling: bool) -> Metrics:
         """Algorithm 1: sample n and n videos, evaluate L, optimize theta, gamma, omega, phi."""
         n = self.config.videos_per_class
-        expert_videos = checked_videos(expert.sample(n, self._rng), self.video_size)
-        other_videos = checked_videos(other.sample(n, self._rng), self.video_size)
+        expert_videos, other_videos = self._sample(expert, n), self._sample(other, n)
         spoiled_count = int(self.config.spoiled_share * n)
         length = min(expert_videos.shape[1], other_videos.shape[1])
         videos = np.concatenate([expert_videos[:, :length], other_videos[:, :length]])
         if spoiled_count:
-            shown = checked_videos(expert.sample(spoiled_count, self._rng), self.video_size)
+            shown = self._sample(expert, spoiled_count)
             videos[-spoiled_count:] = spoiled(shown[:, :length], self._rng)
         drawn = draw(self.config, 2 * n, length, self._rng)
-        with statistics_kept_if_refused(self.networks):
-            total, metrics, distances = self._losses(videos[:, drawn.kept], drawn)
-            take_step(self.networks, self._optimizer, total, metrics, self.version)
+        step = self._begin_step()
+        total, terms, distances = self._losses(videos[:, drawn.kept], drawn)
+        metrics = step.take(total, terms)
         self.version += 1
         self._encodings.clear()
         if scaling:
@@ -194,28 +160,17 @@ class BootifolRewardModel:
         with torch.no_grad():
             distances = torch.linalg.vector_norm(expert - other, dim=2).double().cpu().numpy()
         metrics = {f"loss/{name}": float(term.detach()) for name, term in terms.items()}
-        return (
-            total,
-            {
-                **metrics,
-                "loss/total": float(total.detach()),
-                "distance/expert_other": float(distances.mean()),
-            },
-            distances,
-        )
+        metrics["distance/expert_other"] = float(distances.mean())
+        return total, metrics, distances
 
     def _encode(self, videos: Sequence[Frames]) -> list[torch.Tensor]:
         """Encodings `[T + 1, 128]` of each video, in evaluation mode: a frame's state depends on that frame alone."""
-        frames = np.concatenate([checked_videos(video[None], self.video_size)[0] for video in videos])
-        self.networks.eval()
-        try:
-            with torch.inference_mode():
-                with self._autocast():
-                    states = self.networks.frame_encoder(*self._views(frames)).float()
-                parts = states.split([len(video) for video in videos])
-                return [self.networks.sequence_encoder(part[None])[0][0].cpu() for part in parts]
-        finally:
-            self.networks.train()
+        frames = np.concatenate([self._checked(video) for video in videos])
+        with self._evaluating():
+            with self._autocast():
+                states = self.networks.frame_encoder(*self._views(frames)).float()
+            parts = states.split([len(video) for video in videos])
+            return [self.networks.sequence_encoder(part[None])[0][0].cpu() for part in parts]
 
     def _views(self, frames: Frames) -> tuple[torch.Tensor, torch.Tensor]:
         """uint8 `[N, H, W, 3]` to the views L `[N, 1, H, W]` and ab `[N, 2, H, W]`."""
@@ -231,9 +186,6 @@ class BootifolRewardModel:
             return rewards.amax(0)
         weights = torch.softmax(rewards / self.config.soft_min_temperature, dim=0)
         return (weights * rewards).sum(0)
-
-    def _autocast(self) -> torch.autocast:
-        return torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.precision == "bf16")
 
     def _indices(self, indices: NDArray[np.int64]) -> torch.Tensor:
         return torch.from_numpy(indices.reshape(-1)).to(self.device)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.errors import BootifolError
 
 
 @dataclass(frozen=True)
@@ -40,21 +40,23 @@ class GaifoConfig:
     """bf16 computes the network in bfloat16; parameters, losses and Adam stay in float32."""
 
     def __post_init__(self) -> None:
-        require_at_least(2, stack=self.stack)
-        require_at_least(
-            1,
-            videos_per_class=self.videos_per_class,
-            stacks_per_video=self.stacks_per_video,
-            width_divisor=self.width_divisor,
-        )
-        require_at_least(0, leak=self.leak)
-        if self.width_divisor > 32:
-            raise BootifolError(f"width_divisor must be at most 32, not {self.width_divisor}")
-        if not self.learning_rate > 0:
-            raise BootifolError(f"learning_rate must be above 0, not {self.learning_rate}")
-        for name, chosen, choices in (
-            ("reward", self.reward, ("softplus", "log_sigmoid", "logit")),
-            ("precision", self.precision, ("fp32", "bf16")),
+        for field, least in (
+            ("stack", 2),
+            ("videos_per_class", 1),
+            ("stacks_per_video", 1),
+            ("width_divisor", 1),
         ):
-            if chosen not in choices:
-                raise BootifolError(f"{name} must be one of {', '.join(choices)}, not {chosen}")
+            if not getattr(self, field) >= least:
+                raise BootifolError(f"gaifo: {field} is {getattr(self, field)}, but must be at least {least}")
+        if self.width_divisor > 32:
+            raise BootifolError(f"gaifo: width_divisor is {self.width_divisor}, but must be at most 32")
+        if not 0 <= self.leak < 1:
+            raise BootifolError(f"gaifo: leak is {self.leak}, but must be in [0, 1)")
+        if not self.learning_rate > 0:
+            raise BootifolError(f"gaifo: learning_rate is {self.learning_rate}, but must be above 0")
+        for field, choices in (
+            ("reward", ("softplus", "log_sigmoid", "logit")),
+            ("precision", ("fp32", "bf16")),
+        ):
+            if getattr(self, field) not in choices:
+                raise BootifolError(f"gaifo: {field} is {getattr(self, field)}; use {' or '.join(choices)}")

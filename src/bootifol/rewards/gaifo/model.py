@@ -8,20 +8,18 @@ import numpy as np
 import torch
 
 from bootifol.errors import BootifolError
-from bootifol.rewards.checked_videos import checked_videos
 from bootifol.rewards.gaifo import losses
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.gaifo.networks import Discriminator
 from bootifol.rewards.gaifo.stacks import as_pictures, draw_stacks, stack_frames
-from bootifol.rewards.gradient_step import statistics_kept_if_refused, take_step
-from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
-from bootifol.types import Arrays, FrameBatch, Metrics, Rewards, Video, VideoSource
+from bootifol.rewards.learned import LearnedRewardModel
+from bootifol.types import FrameBatch, Metrics, Rewards, Video, VideoSource
 
 LABEL_BATCH = 256
 """Stacks rewarded at once, which bounds the memory that a long video takes."""
 
 
-class GaifoRewardModel:
+class GaifoRewardModel(LearnedRewardModel[GaifoConfig, Discriminator]):
     """A discriminator between the expert's stacks of frames and others.
 
     Args:
@@ -31,23 +29,11 @@ class GaifoRewardModel:
         device: where to compute, as PyTorch names it.
     """
 
-    reads_environment_reward = False
+    keeps_learning = True
     reference_count = 0
 
     def __init__(self, config: GaifoConfig, video_size: int, seed: int, device: str = "cpu") -> None:
-        self.config = config
-        self.video_size = video_size
-        self.device = torch.device(device)
-        self.version = 0
-        # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self.discriminator = Discriminator(config, video_size)
-        self.discriminator.to(self.device)
-        self._optimizer = torch.optim.Adam(
-            self.discriminator.parameters(), lr=config.learning_rate, fused=True
-        )
-        self._rng = np.random.default_rng(seed)
+        super().__init__(Discriminator, config, video_size, seed, device)
 
     def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
         """Alignment Phase, which the paper does not have: one gradient step with random videos as the other class."""
@@ -64,46 +50,21 @@ class GaifoRewardModel:
         Raises:
             BootifolError: the video has another size than the model was made for.
         """
-        frames = checked_videos(video.frames[None], self.video_size)[0]
+        frames = self._checked(video.frames)
         if len(frames) < 2:
             return np.zeros(0, np.float32)
         ends = np.arange(1, len(frames))
         indices = stack_frames(ends, self.config.stack)
-        self.discriminator.eval()
-        try:
-            with torch.inference_mode():
-                logits = [
-                    self._logits(as_pictures(frames[part]))
-                    for part in np.split(indices, range(LABEL_BATCH, len(indices), LABEL_BATCH))
-                ]
-                return losses.reward(torch.cat(logits), self.config.reward).cpu().numpy()
-        finally:
-            self.discriminator.train()
-
-    def state(self) -> Arrays:
-        """Parameters, BatchNorm statistics, Adam, random state and version."""
-        return {
-            **module_state(self.discriminator, self._optimizer),
-            "random": generator_array(self._rng),
-            "version": np.array([self.version], dtype=np.int64),
-        }
-
-    def load_state(self, arrays: Arrays) -> None:
-        """Takes over what `state` gave; goes on bit for bit as that model would.
-
-        Raises:
-            BootifolError: an array is missing or has another shape (the run had another configuration).
-        """
-        load_module_state(self.discriminator, self._optimizer, arrays)
-        load_generator(self._rng, arrays["random"])
-        self.version = int(arrays["version"][0])
+        with self._evaluating():
+            logits = [
+                self._logits(as_pictures(frames[part]))
+                for part in np.split(indices, range(LABEL_BATCH, len(indices), LABEL_BATCH))
+            ]
+            return losses.reward(torch.cat(logits), self.config.reward).cpu().numpy()
 
     def _step(self, expert: VideoSource, other: VideoSource) -> Metrics:
         """Algorithm 1, "update the discriminator": sample as many stacks of either class, go down L_D once."""
-        videos = [
-            checked_videos(source.sample(self.config.videos_per_class, self._rng), self.video_size)
-            for source in (expert, other)
-        ]
+        videos = [self._sample(source, self.config.videos_per_class) for source in (expert, other)]
         # Beyond the shorter class's length, how late it is would tell the classes apart.
         length = min(of_class.shape[1] for of_class in videos)
         if length < 2:
@@ -114,9 +75,8 @@ class GaifoRewardModel:
             draw_stacks(of_class[:, :length], self.config.stacks_per_video, self.config.stack, self._rng)
             for of_class in videos
         ]
-        with statistics_kept_if_refused(self.discriminator):
-            loss, metrics = self._loss(*stacks)
-            take_step(self.discriminator, self._optimizer, loss, metrics, self.version)
+        step = self._begin_step()
+        metrics = step.take(*self._loss(*stacks))
         self.version += 1
         return metrics
 
@@ -136,6 +96,6 @@ class GaifoRewardModel:
 
     def _logits(self, pictures: torch.Tensor) -> torch.Tensor:
         """Float32 logits `[N]` of stacks `[N, 3 * stack, H, W]`."""
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.precision == "bf16"):
-            logits: torch.Tensor = self.discriminator(pictures.to(self.device))
+        with self._autocast():
+            logits: torch.Tensor = self.networks(pictures.to(self.device))
             return logits.float()

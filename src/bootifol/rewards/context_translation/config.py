@@ -1,0 +1,72 @@
+"""What can be chosen about context translation; the defaults are those of its paper and its authors' release."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from bootifol.errors import BootifolError
+
+
+@dataclass(frozen=True)
+class ContextTranslationConfig:
+    """The reward model of context translation."""
+
+    references: int = 10
+    """n: expert videos that are translated into the context of an episode and averaged; BootIfOL's paper compares
+    with 10 and with 1."""
+
+    image_weight: float = 1.0
+    """w_rec: weight of the squared distance of pictures in the reward (1 in the release); 0 leaves it out."""
+
+    reward_unit: Literal["none", "expert"] = "none"
+    """none (the paper), or expert: rewards are divided by the cost that an expert frame itself has against one
+    translation, averaged over the end of the Alignment Phase, so an expert gets about -1 a step whatever the size
+    of pictures and features. A constant, so it changes no policy's rank."""
+
+    reconstruction_weight: float = 1.0
+    """lambda_1: weight of L_rec; 0 leaves the loss out."""
+
+    alignment_weight: float = 0.0029
+    """lambda_2: weight of L_align; 0 leaves the loss out. The release weighs sums over its 48x48 pictures against
+    1000 times the mean over features in batches of 100; between means that is 0.0029."""
+
+    pairs: int = 100
+    """Pairs of expert videos in a batch."""
+
+    frames_per_pair: int = 1
+    """Time steps drawn from every pair; the release's batch has 100 pairs with one each."""
+
+    width_divisor: int = 1
+    """Divides the channels and the number of features; 1 is the paper's network."""
+
+    leak: float = 0.2
+    """Slope of LeakyReLU below zero."""
+
+    learning_rate: float = 1e-4
+    """Of Adam."""
+
+    precision: Literal["fp32", "bf16"] = "fp32"
+    """bf16 computes the networks in bfloat16; parameters, losses, rewards and Adam stay in float32."""
+
+    def __post_init__(self) -> None:
+        for field in ("references", "pairs", "frames_per_pair", "width_divisor"):
+            if getattr(self, field) < 1:
+                raise BootifolError(
+                    f"context translation: {field} is {getattr(self, field)}, but must be at least 1"
+                )
+        if self.width_divisor > 32:
+            raise BootifolError(
+                f"context translation: width_divisor is {self.width_divisor}, but must be at most 32"
+            )
+        if not self.learning_rate > 0:
+            raise BootifolError(
+                f"context translation: learning_rate is {self.learning_rate}, but must be above 0"
+            )
+        for field in ("image", "reconstruction", "alignment"):
+            if not getattr(self, f"{field}_weight") >= 0:
+                raise BootifolError(
+                    f"context translation: {field}_weight is {getattr(self, f'{field}_weight')}; use 0 to leave it out"
+                )
+        if not 0 <= self.leak < 1:
+            raise BootifolError(f"context translation: leak is {self.leak}, but must be in [0, 1)")

@@ -1,0 +1,112 @@
+"""What the reward models that learn have in common: networks, their optimizer, random draws, and their state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+import torch
+from torch import nn
+
+from bootifol.rewards.gradient_step import GradientStep
+from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
+from bootifol.rewards.video_checks import checked_videos
+from bootifol.types import Arrays, FrameBatch, Frames, VideoSource
+
+
+class LearnedConfig(Protocol):
+    """What the configuration of every method that learns has."""
+
+    @property
+    def learning_rate(self) -> float:
+        """Of Adam."""
+        ...
+
+    @property
+    def precision(self) -> str:
+        """fp32, or bf16 to compute in bfloat16 where a method allows it."""
+        ...
+
+
+Config = TypeVar("Config", bound=LearnedConfig)
+Networks = TypeVar("Networks", bound=nn.Module)
+
+
+class LearnedRewardModel(Generic[Config, Networks]):
+    """The base of the methods' reward models, which add `align`, `update` and `label`.
+
+    Args:
+        make_networks: the method's networks, from its configuration and the side of the videos.
+        config: the method's.
+        video_size: side of the (square) videos in pixels.
+        seed: of the parameters and of every draw.
+        device: where to compute, as PyTorch names it.
+    """
+
+    reads_environment_reward = False
+
+    def __init__(
+        self,
+        make_networks: Callable[[Config, int], Networks],
+        config: Config,
+        video_size: int,
+        seed: int,
+        device: str,
+    ) -> None:
+        self.config = config
+        self.video_size = video_size
+        self.device = torch.device(device)
+        self.version = 0
+        # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self.networks = make_networks(config, video_size)
+        self.networks.to(self.device)
+        self._optimizer = torch.optim.Adam(self.networks.parameters(), lr=config.learning_rate, fused=True)
+        self._rng = np.random.default_rng(seed)
+
+    def state(self) -> Arrays:
+        """Parameters, normalization statistics, Adam, random state and version."""
+        return {
+            **module_state(self.networks, self._optimizer),
+            "random": generator_array(self._rng),
+            "version": np.array([self.version], dtype=np.int64),
+        }
+
+    def load_state(self, arrays: Arrays) -> None:
+        """Takes over what `state` gave; goes on bit for bit as that model would.
+
+        Raises:
+            BootifolError: an array is missing or has another shape (the run had another configuration).
+        """
+        load_module_state(self.networks, self._optimizer, arrays)
+        load_generator(self._rng, arrays["random"])
+        self.version = int(arrays["version"][0])
+
+    def _sample(self, source: VideoSource, count: int) -> FrameBatch:
+        """Videos drawn at random, uint8 `[count, T + 1, H, W, 3]` of the model's size."""
+        return checked_videos(source.sample(count, self._rng), self.video_size)
+
+    def _checked(self, frames: Frames) -> Frames:
+        """One video, uint8 `[T + 1, H, W, 3]` of the model's size."""
+        video: Frames = checked_videos(frames[None], self.video_size)[0]
+        return video
+
+    def _begin_step(self) -> GradientStep:
+        """The gradient step after those that `version` counts; to be made before the forward pass."""
+        return GradientStep(self.networks, self._optimizer, self.version + 1)
+
+    @contextmanager
+    def _evaluating(self) -> Iterator[None]:
+        """Without gradients, and with the running normalization statistics: a frame is encoded by itself alone."""
+        self.networks.eval()
+        try:
+            with torch.inference_mode():
+                yield
+        finally:
+            self.networks.train()
+
+    def _autocast(self) -> torch.autocast:
+        return torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.precision == "bf16")

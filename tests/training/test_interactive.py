@@ -1,0 +1,38 @@
+"""When the reward learns while the agent acts, and when stored rewards are renewed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tiny_runs import TINY, new_run
+
+from bootifol.rewards.registry import METHODS
+
+CONFIG = replace(TINY, interactive=replace(TINY.interactive, reward_updates_until=150))
+"""240 agent steps, the first 60 of which warm up; an update of the reward every 40."""
+
+UPDATES_AT = {
+    "bootifol": [80, 120],
+    "virl": [80, 120, 160, 200, 240],
+    "context_translation": [],
+    "gaifo": [80, 120, 160, 200, 240],
+    "environment": [],
+}
+"""Agent steps at which the reward learns: until N_train, or to the end as in the method's own paper, or never."""
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+def test_the_reward_learns_as_long_as_its_paper_says(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    run = new_run(tmp_path / "run", demos, method, CONFIG)
+    renewed_at: list[int] = []
+    monkeypatch.setattr(
+        run.components.replay, "relabel", lambda *_: renewed_at.append(run.counters.agent_steps)
+    )
+    while not run.budget.ended(run.counters):
+        run.interactive.play_episode()
+    assert renewed_at == UPDATES_AT[method]  # and rewards that are not stale are left alone
+    assert run.counters.reward_updates == run.components.reward_model.version == len(UPDATES_AT[method])
