@@ -78,7 +78,9 @@ CPU = TrainingConfig(
         reward_updates_until=15_000,
         agent_videos=500,
     ),
-    demonstrations=DemonstrationConfig(share=0.25, inverse_dynamics_updates=2000, cloning_updates=5000),
+    demonstrations=DemonstrationConfig(
+        share=0.25, videos=3000, inverse_dynamics_updates=2000, cloning_updates=5000
+    ),
     evaluation=EvaluationConfig(every=2500, long_episodes=5, final_episodes=50),
 )
 """The same algorithm with smaller networks, pictures and counts: meant for about an hour on 2 cores and 8 GB.
