@@ -96,7 +96,7 @@ DEMO = replace(
     agent=replace(CPU.agent, replay_capacity=20_000),
     alignment=AlignmentConfig(gradient_steps=500, time_share=0.25),
     interactive=replace(CPU.interactive, agent_videos=300),
-    demonstrations=replace(CPU.demonstrations, inverse_dynamics_updates=1000, cloning_updates=2500, phases=2),
+    demonstrations=replace(CPU.demonstrations, inverse_dynamics_updates=1500, cloning_updates=4000, phases=1),
     evaluation=EvaluationConfig(every=2500, long_episodes=1, final_episodes=10),
     checkpoint_minutes=5.0,
 )
