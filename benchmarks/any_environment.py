@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bootifol.cli.main import main as bootifol
-from bootifol.demos.video_files import write_video
+from bootifol.demos.video_writing import write_video
 from bootifol.envs.any_gymnasium import GymnasiumSimulator
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError

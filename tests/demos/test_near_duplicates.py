@@ -5,7 +5,8 @@ from test_looks import walking_block
 
 from bootifol.demos.looks import look_at
 from bootifol.demos.near_duplicates import near_duplicates
-from bootifol.demos.video_files import read_video, write_video
+from bootifol.demos.video_files import read_video
+from bootifol.demos.video_writing import write_video
 from bootifol.envs.pictures import centered_square
 
 

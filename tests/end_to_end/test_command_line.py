@@ -10,7 +10,7 @@ import pytest
 
 from bootifol.cli.main import main
 from bootifol.demos.demo_set import DemoSet
-from bootifol.demos.video_files import write_video
+from bootifol.demos.video_writing import write_video
 from bootifol.training.checkpoint import newest_checkpoint
 
 SMALL = ["--agent-size", "32", "--video-size", "32"]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from bootifol.demos.video_files import write_video
+from bootifol.demos.video_writing import write_video
 from bootifol.evaluation.tables import EvaluationRow, RankingRow, append_evaluations, append_ranking
 from bootifol.files import write_arrays
 from bootifol.types import Arrays, Frames

@@ -12,7 +12,7 @@ from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.demos.lerobot import parquet_library
 from bootifol.demos.lerobot_export import write_lerobot
 from bootifol.demos.shards import sha256_of_frames
-from bootifol.demos.video_files import exact_rate, write_video
+from bootifol.demos.video_writing import exact_rate, write_video
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.progress import progress

@@ -21,7 +21,8 @@ from bootifol.demos.shards import (
     videos_per_shard,
     write_shard,
 )
-from bootifol.demos.video_files import TimedFrame, frame_rate, is_lerobot_dataset, stream_video
+from bootifol.demos.upright import TimedFrame
+from bootifol.demos.video_files import frame_rate, is_lerobot_dataset, stream_video
 from bootifol.envs.pictures import centered_square
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside

@@ -15,7 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bootifol.demos.video_files import TimedFrame, is_lerobot_dataset, stream_part
+from bootifol.demos.decoding import stream_part
+from bootifol.demos.upright import TimedFrame
+from bootifol.demos.video_files import is_lerobot_dataset
 from bootifol.errors import BootifolError
 from bootifol.files import read_json
 

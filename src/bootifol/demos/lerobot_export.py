@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bootifol.demos.lerobot import EPISODES_DIRECTORY, INFO_PATH, parquet_library
-from bootifol.demos.video_files import encoded_video, exact_rate
+from bootifol.demos.video_writing import encoded_video, exact_rate
 from bootifol.files import write_json
 from bootifol.types import Frame, Frames
 

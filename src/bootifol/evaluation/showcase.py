@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from bootifol.demos.video_files import write_video
+from bootifol.demos.video_writing import write_video
 from bootifol.envs.rollout import Act, play_episode
 from bootifol.evaluation.ranking import draw_references
 from bootifol.files import write_arrays

@@ -1,0 +1,111 @@
+"""Videos that are no video files: folders of pictures, and numpy arrays."""
+
+from __future__ import annotations
+
+import math
+import re
+import tokenize
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from bootifol.demos.upright import TimedFrame, upright_picture
+from bootifol.errors import BootifolError
+
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+# What numpy raises on a damaged header, which it reads as a Python literal.
+_DAMAGED_ARRAY = (ValueError, OSError, EOFError, SyntaxError, tokenize.TokenError, MemoryError, TypeError)
+
+
+def stream_folder(path: Path) -> Iterator[TimedFrame]:
+    """Reads a folder of pictures as one video, in natural order of their names; errors are `BootifolError`."""
+    pictures = pictures_in(path)
+    if not pictures:
+        raise BootifolError(f"{path} holds no pictures: a folder should hold one video as png or jpg files")
+    size: tuple[int, int] | None = None
+    for file in pictures:
+        try:
+            with Image.open(file) as picture:
+                frame = upright_picture(picture)
+        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+            raise BootifolError(f"{file} is damaged or no picture: {error}") from error
+        if size is not None and frame.shape[:2] != size:
+            raise BootifolError(
+                f"{file} is {frame.shape[1]}×{frame.shape[0]} pixels and the pictures before it are "
+                f"{size[1]}×{size[0]}: one folder should hold one video"
+            )
+        size = frame.shape[:2]
+        yield TimedFrame(frame, None)
+
+
+def pictures_in(folder: Path) -> list[Path]:
+    """The pictures of a folder in natural order of their names."""
+    pictures = (file for file in folder.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES)
+    return sorted(pictures, key=natural_order)
+
+
+def natural_order(path: Path) -> list[tuple[int, str]]:
+    """A key for sorting: `frame2` comes before `frame10`."""
+    return [
+        (int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name.lower())
+    ]
+
+
+def stream_array(path: Path) -> Iterator[TimedFrame]:
+    """Reads a .npy file, uint8 `[frames, H, W, 3]`; errors are `BootifolError`."""
+    try:
+        frames = np.load(path, mmap_mode="r", allow_pickle=False)
+    except _DAMAGED_ARRAY as error:
+        raise BootifolError(f"{path} is damaged or no numpy array: {error}") from error
+    if frames.dtype != np.uint8 or frames.ndim != 4 or frames.shape[-1] != 3 or frames.size == 0:
+        raise BootifolError(
+            f"{path} holds {frames.dtype} {list(frames.shape)}: a video is uint8 [frames, height, width, 3]"
+        )
+    for frame in frames:
+        yield TimedFrame(np.array(frame), None)
+
+
+def stream_archive(path: Path) -> Iterator[TimedFrame]:
+    """Reads the one video of a .npz archive; errors are `BootifolError`."""
+    try:
+        inside = _arrays_inside(path)
+        videos = [
+            name
+            for name, (shape, dtype) in inside.items()
+            if dtype == np.uint8 and len(shape) == 4 and shape[-1] == 3 and math.prod(shape) > 0
+        ]
+        if len(videos) != 1:
+            listed = ", ".join(f"{name} {dtype} {list(shape)}" for name, (shape, dtype) in inside.items())
+            raise BootifolError(
+                f"{path} holds {len(videos) or 'no'} arrays that could be the video, uint8 [frames, height, "
+                f"width, 3], among {listed or 'nothing'}: save the one video alone"
+            )
+        frames = np.load(path, allow_pickle=False)[videos[0]]
+    except (*_DAMAGED_ARRAY, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        raise BootifolError(f"{path} is damaged or no .npz archive: {error}") from error
+    for frame in frames:
+        yield TimedFrame(np.array(frame), None)
+
+
+def _arrays_inside(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[np.generic]]]:
+    """Shape and type of the arrays in an archive by their names; only the headers are read, nothing is unpickled."""
+    inside = {}
+    with zipfile.ZipFile(path) as archive:
+        for member in archive.namelist():
+            if not member.endswith(".npy"):
+                continue
+            with archive.open(member) as file:
+                version = np.lib.format.read_magic(file)
+                read_header = (
+                    np.lib.format.read_array_header_1_0
+                    if version == (1, 0)
+                    else np.lib.format.read_array_header_2_0
+                )
+                shape, _, dtype = read_header(file)
+            inside[member.removesuffix(".npy")] = (shape, dtype)
+    return inside
