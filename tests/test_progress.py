@@ -36,6 +36,24 @@ def test_lines_come_every_half_minute_with_rate_and_remaining_time(
     ]
 
 
+def test_seconds_of_a_budget_are_told_as_time_without_a_rate(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 0.0
+    monkeypatch.setattr(module.time, "monotonic", lambda: now)
+    with progress("acting", total=300, unit="seconds") as advance:
+        now += 40.0
+        advance(39)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[:2] == ["acting: 0 s of 5 min 00 s", "acting: 39 s of 5 min 00 s, 4 min 21 s left"]
+
+
+def test_the_unit_follows_the_count(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress("cloning", total=1, unit="steps") as advance:
+        advance()
+    assert capsys.readouterr().err.splitlines()[0] == "cloning: 0/1 steps"
+
+
 def test_an_error_inside_is_not_swallowed() -> None:
     with pytest.raises(KeyError), progress("failing", total=2):
         raise KeyError("inside")

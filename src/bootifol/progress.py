@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Protocol
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
 _SECONDS_BETWEEN_LINES = 30.0
@@ -22,7 +22,7 @@ class Advance(Protocol):
 
 
 @contextmanager
-def progress(description: str, total: int, done: int = 0) -> Iterator[Advance]:
+def progress(description: str, total: int, done: int = 0, unit: str = "") -> Iterator[Advance]:
     """Shows progress on standard error while the block runs.
 
     On a terminal this is a bar; elsewhere one line at the start, one every 30 seconds and one at the end,
@@ -32,13 +32,14 @@ def progress(description: str, total: int, done: int = 0) -> Iterator[Advance]:
         description: what is being done, such as "recording expert".
         total: units of the whole job.
         done: units finished before this call (a resumed job); they do not count in the rate.
+        unit: what is counted, such as "agent steps"; of "seconds" there is no rate.
 
     Yields:
         `advance(n=1, **shown)`; for example `advance(1, loss=0.31)`.
     """
     console = Console(stderr=True)
     if not console.is_terminal:
-        lines = _Lines(description, total, done)
+        lines = _Lines(description, total, done, unit)
         try:
             yield lines.advance
         finally:
@@ -48,8 +49,8 @@ def progress(description: str, total: int, done: int = 0) -> Iterator[Advance]:
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
-        MofNCompleteColumn(),
-        _RateAndRemaining(),
+        _Count(unit),
+        _RateAndRemaining(unit),
         TextColumn("{task.fields[shown]}", style="dim"),
         console=console,
     )
@@ -75,27 +76,43 @@ def duration(seconds: float) -> str:
     return f"{minutes // 60} h {minutes % 60:02d} min"
 
 
+class _Count(ProgressColumn):
+    """`160/400 gradient steps`."""
+
+    def __init__(self, unit: str) -> None:
+        super().__init__()
+        self.unit = unit
+
+    def render(self, task: Task) -> Text:
+        return Text(_count(task.completed, task.total or 0, self.unit), style="progress.download")
+
+
 class _RateAndRemaining(ProgressColumn):
     """`12.1/s, 3 min 20 s left`, from the last half minute."""
+
+    def __init__(self, unit: str) -> None:
+        super().__init__()
+        self.unit = unit
 
     def render(self, task: Task) -> Text:
         if task.finished:
             return Text(f"in {duration(task.finished_time or 0.0)}")
         if not task.speed or task.remaining is None:
             return Text("")
-        return Text(f"{_rate(task.speed)}, {duration(task.remaining / task.speed)} left")
+        return Text(_rate_and_remaining(task.speed, task.remaining, self.unit))
 
 
 class _Lines:
     """The plain variant: prints the state of the job at most every 30 seconds."""
 
-    def __init__(self, description: str, total: int, done: int) -> None:
+    def __init__(self, description: str, total: int, done: int, unit: str) -> None:
         self.description = description
         self.total = total
         self.count = self.count_before = done
+        self.unit = unit
         self.latest: dict[str, float | str] = {}
         self.started = self.printed = time.monotonic()
-        print(f"{description}: {done}/{total}", file=sys.stderr, flush=True)
+        print(f"{description}: {_count(done, total, unit)}", file=sys.stderr, flush=True)
 
     def advance(self, n: int = 1, **shown: float | str) -> None:
         self.count += n
@@ -107,14 +124,26 @@ class _Lines:
         self.printed = time.monotonic()
         seconds = self.printed - self.started
         rate = (self.count - self.count_before) / max(seconds, 1e-9)
-        parts = [f"{self.description}: {self.count}/{self.total}"]
+        parts = [f"{self.description}: {_count(self.count, self.total, self.unit)}"]
         if self.count >= self.total:
             parts.append(f"done in {duration(seconds)}")
         elif rate > 0:
-            parts += [_rate(rate), f"{duration((self.total - self.count) / rate)} left"]
+            parts.append(_rate_and_remaining(rate, self.total - self.count, self.unit))
         if self.latest:
             parts.append(_shown(self.latest))
         print(", ".join(parts), file=sys.stderr, flush=True)
+
+
+def _count(done: float, total: float, unit: str) -> str:
+    if unit == "seconds":
+        return f"{duration(done)} of {duration(total)}"
+    return f"{done:.0f}/{total:.0f} {unit}".rstrip()
+
+
+def _rate_and_remaining(rate: float, remaining: float, unit: str) -> str:
+    if unit == "seconds":
+        return f"{duration(remaining)} left"
+    return f"{_rate(rate)}, {duration(remaining / rate)} left"
 
 
 def _rate(per_second: float) -> str:

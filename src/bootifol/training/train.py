@@ -128,7 +128,7 @@ class Run:
         model = self.components.reward_model
         shown = {"loss": float("nan")}
         unit, done, total = self.budget.alignment_extent(self.counters)
-        with progress(f"aligning the reward ({unit})", total, done) as advance:
+        with progress("aligning the reward", total, done, unit) as advance:
             for metrics in alignment_phase(
                 model, self.demos.expert, self.demos.random, self.budget, self.counters
             ):
@@ -164,7 +164,7 @@ class Run:
             self.budget,
             self.counters,
         )
-        with progress("cloning the videos (steps)", total, done) as advance:
+        with progress("cloning the videos", total, done, "steps") as advance:
             for metrics in phase:
                 averages.add(metrics)
                 done += 1
@@ -200,7 +200,7 @@ class Run:
         config, counters = self.run.training, self.counters
         self.interactive.start_clock()
         unit, done, total = self.budget.interactive_extent(counters)
-        with progress(f"acting and learning ({unit})", total, done) as advance:
+        with progress("acting and learning", total, done, unit) as advance:
             while not (self.budget.ended(counters) or self.interactive.cloning_due):
                 logged = counters.agent_steps // config.interactive.log_every
                 self.interactive.play_episode()
