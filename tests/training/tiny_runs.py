@@ -64,7 +64,6 @@ WITH_DEMONSTRATIONS = replace(
         cloning_updates=4,
         phases=3,
         repeat_every=60,
-        repeat_share=0.5,
         batch_size=8,
     ),
 )

@@ -124,14 +124,10 @@ def _steps_done(counters: Counters) -> CloningSteps:
 
 
 def _steps_until(demonstrations: Demonstrations, cloning_phases: int) -> CloningSteps:
-    """Steps when so many phases have ended; those after the first have fewer gradient steps."""
-    config, later = demonstrations.config, max(cloning_phases - 1, 0)
-
-    def gradient_steps(of_first: int) -> int:
-        return of_first * min(cloning_phases, 1) + later * round(config.repeat_share * of_first)
-
+    """Steps when so many phases have ended."""
+    config = demonstrations.config
     return CloningSteps(
-        gradient_steps(config.inverse_dynamics_updates),
+        cloning_phases * config.inverse_dynamics_updates,
         cloning_phases * len(demonstrations),
-        gradient_steps(config.cloning_updates),
+        cloning_phases * config.cloning_updates,
     )

@@ -51,13 +51,13 @@ class DemonstrationConfig:
     more like the expert than random actions do. The rest comes from all steps."""
 
     inverse_dynamics_updates: int = 1500
-    """Gradient steps of the inverse dynamics in the first Cloning Phase, when the agent's warm-up ends."""
+    """Gradient steps of the inverse dynamics in each Cloning Phase; the first comes when the agent's warm-up ends."""
 
     inverse_dynamics_learning_rate: float = 5e-4
     """Of Adam at its highest: in each phase it rises for a twentieth of the gradient steps and falls to 0."""
 
     cloning_updates: int = 4000
-    """Gradient steps of encoder and actor towards the inferred actions in the first Cloning Phase."""
+    """Gradient steps of encoder and actor towards the inferred actions in each Cloning Phase."""
 
     cloning_learning_rate: float = 1e-3
     """Of Adam at its highest, rising and falling likewise."""
@@ -69,16 +69,13 @@ class DemonstrationConfig:
     """Agent steps from one Cloning Phase to the next: steps of a policy that moves like the expert teach the inverse
     dynamics what random ones cannot, and every demonstration gets its actions and rewards anew."""
 
-    repeat_share: float = 1.0
-    """Gradient steps of each later Cloning Phase, as a share of the first one's."""
-
     batch_size: int = 128
     """Transitions of a gradient step of the inverse dynamics."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.share < 1:
             raise BootifolError(f"demonstrations: share must be in [0, 1), not {self.share}")
-        for name in ("moving_share", "history_dropout", "policy_share", "repeat_share"):
+        for name in ("moving_share", "history_dropout", "policy_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise BootifolError(f"demonstrations: {name} must be in [0, 1], not {getattr(self, name)}")
         names = ("videos", "inverse_dynamics_updates", "phases", "repeat_every", "batch_size")
