@@ -3,21 +3,29 @@
 The plain versions (`benchmarks/plain`) are fp32, written straight from the equations, and tested against ours. Inputs
 are random, both sides get the same, and the two are timed in turn, so that a busy machine slows both. Quote the
 ratios; absolute times belong to a machine.
+
+The floor is what the machine could not beat: the stage's arithmetic (matrix products and convolutions, as PyTorch
+counts them; its fused LSTM is not counted) at the rate of a large matrix product, plus the bytes that must move
+(pixels in, parameters and Adam's averages in and out) at the rate of a copy, both measured in the same run.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import statistics
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
+from torch import nn
+from torch.utils.flop_counter import FlopCounterMode
 
 from benchmarks.plain.alignment import PlainBootifol
 from benchmarks.plain.drqv2 import PlainDrQv2, PlainReplay
@@ -41,9 +49,29 @@ CONVOLUTIONS = {
     "coarse": ((32, 8, 4), (64, 4, 2), (64, 3, 1)),
 }
 
-STAGES = ["environment", "update", "alignment", "label"]
+STAGES = ["environment", "meta_world", "update", "alignment", "label"]
 
 Work = Callable[[], object]
+
+
+class Stage(NamedTuple):
+    """The same work twice."""
+
+    ours: Work
+    plain: Work
+    parameters: int | None
+    """Trained by it (0: none); None where a floor of arithmetic and bytes says nothing: simulation, rendering."""
+    pixels: int
+    """Bytes of pictures that it reads."""
+
+
+class Rates(NamedTuple):
+    """What the machine can do, measured."""
+
+    arithmetic: float
+    """Operations a second of a bf16 matrix product."""
+    copy: float
+    """Bytes a second, read and written."""
 
 
 class RandomVideos:
@@ -62,20 +90,22 @@ class RandomVideos:
         return self.frames[rng.choice(len(self), count, replace=False)]
 
 
-def environment_step(config: TrainingConfig) -> tuple[Work, Work]:
+def environment_step(config: TrainingConfig, task: str) -> Stage:
     """An agent step: the preset's render profile beside the simulator's own quality."""
 
     def stepper(profile: RenderProfile) -> Work:
-        environment = make_environment("reacher_hard", replace(config.pictures, profile=profile), 10**9)
+        environment = make_environment(task, replace(config.pictures, profile=profile), 10**9)
         environment.reset(seed=0)
-        actions = np.random.default_rng(0).uniform(-1, 1, (1000, ACTION_DIM)).astype(np.float32)
-        taken = iter(np.resize(actions, (10**5, ACTION_DIM)))
+        shape = environment.action_space.shape
+        assert shape is not None
+        actions = np.random.default_rng(0).uniform(-1, 1, (1000, *shape)).astype(np.float32)
+        taken = itertools.cycle(actions)
         return lambda: environment.step(next(taken))
 
-    return stepper(config.pictures.profile), stepper("full")
+    return Stage(stepper(config.pictures.profile), stepper("full"), None, 0)
 
 
-def agent_update(config: TrainingConfig) -> tuple[Work, Work]:
+def agent_update(config: TrainingConfig) -> Stage:
     """Sampling a batch from replay and one DrQ-v2 update."""
     agent_config, pictures = config.agent, config.pictures
     size, stack, batch_size = pictures.agent_size, pictures.stack, agent_config.batch_size
@@ -104,10 +134,12 @@ def agent_update(config: TrainingConfig) -> tuple[Work, Work]:
         shifts = torch.randint(-agent_config.shift, agent_config.shift + 1, (2, batch_size, 2))
         plain.update(plain_replay.sample(batch_size, rng), noise[0], noise[1], shifts, agent_config.shift)
 
-    return lambda: agent.update(replay.sample(batch_size, rng), 0), plain_update
+    trained = count_parameters(agent.encoder, agent.actor, agent.critic)
+    pixels = 2 * batch_size * 3 * stack * size**2
+    return Stage(lambda: agent.update(replay.sample(batch_size, rng), 0), plain_update, trained, pixels)
 
 
-def alignment_step(config: TrainingConfig, reward: BootifolConfig) -> tuple[Work, Work]:
+def alignment_step(config: TrainingConfig, reward: BootifolConfig) -> Stage:
     """One gradient step of the reward on n expert and n other videos, every loss on every frame on both sides."""
     rng = np.random.default_rng(0)
     videos = RandomVideos(2 * reward.videos_per_class, config.pictures.video_size, rng)
@@ -115,13 +147,15 @@ def alignment_step(config: TrainingConfig, reward: BootifolConfig) -> tuple[Work
     model = BootifolRewardModel(same_work, config.pictures.video_size, 0)
     plain = PlainBootifol(reward.width_divisor)
     n = reward.videos_per_class
-    return (
+    return Stage(
         lambda: model.update(videos, videos),
         lambda: plain.alignment_step(videos.sample(n, rng), videos.sample(n, rng)),
+        count_parameters(model.networks),
+        videos.frames.nbytes,
     )
 
 
-def label_episode(config: TrainingConfig, reward: BootifolConfig) -> tuple[Work, Work]:
+def label_episode(config: TrainingConfig, reward: BootifolConfig) -> Stage:
     """Rewarding an episode of 61 frames against one expert video whose encoding is not cached yet."""
     rng = np.random.default_rng(0)
     videos = RandomVideos(2, config.pictures.video_size, rng)
@@ -133,7 +167,43 @@ def label_episode(config: TrainingConfig, reward: BootifolConfig) -> tuple[Work,
     def label() -> None:
         model.label(videos[0], [Video(f"never seen {next(names)}", videos.frames[1])])
 
-    return label, lambda: plain.label(videos.frames[0], videos.frames[1])
+    return Stage(label, lambda: plain.label(videos.frames[0], videos.frames[1]), 0, videos.frames.nbytes)
+
+
+def count_parameters(*networks: nn.Module) -> int:
+    return sum(parameter.numel() for network in networks for parameter in network.parameters())
+
+
+def measured_rates() -> Rates:
+    """Of a matrix product of 2048 x 2048 in bf16, and of copying a quarter of a gigabyte."""
+    matrix = torch.randn(2048, 2048).bfloat16()
+    source = torch.ones(2**28, dtype=torch.uint8)
+    target = torch.empty_like(source)
+    return Rates(
+        2 * 2048**3 / quickest(lambda: matrix @ matrix),
+        2 * source.nbytes / quickest(lambda: target.copy_(source)),
+    )
+
+
+def quickest(work: Work, runs: int = 7) -> float:
+    """Seconds of the quickest run."""
+    times = []
+    for _ in range(runs):
+        started = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - started)
+    return min(times)
+
+
+def floor(stage: Stage, rates: Rates) -> float | None:
+    """Milliseconds that the stage's arithmetic and bytes take at the machine's rates."""
+    if stage.parameters is None:
+        return None
+    with FlopCounterMode(display=False) as counter:
+        stage.ours()
+    # Read: parameter, gradient, both averages; written: parameter and averages; 4 bytes each.
+    moved = stage.pixels + 7 * 4 * stage.parameters
+    return 1e3 * (counter.get_total_flops() / rates.arithmetic + moved / rates.copy)
 
 
 def medians(ours: Work, plain: Work, runs: int, warm_up: int) -> tuple[float, float]:
@@ -159,8 +229,16 @@ def main() -> None:
     arguments = parser.parse_args()
     keep_freed_memory()
     torch.set_num_threads(arguments.threads)
+    rates = measured_rates()
     table = Table(
-        "sizes", "stage", "ours ms", "plain ms", "plain / ours", title=f"{arguments.threads} thread(s)"
+        "sizes",
+        "stage",
+        *(
+            Column(name, justify="right")
+            for name in ("ours ms", "plain ms", "plain / ours", "floor ms", "floor / ours")
+        ),
+        title=f"{arguments.threads} thread(s), {rates.arithmetic / 1e9:.0f} GFLOP/s in bf16, copies of "
+        f"{rates.copy / 1e9:.1f} GB/s",
     )
     presets = {"paper": PAPER, "cpu": CPU}
     with progress("timing", total=len(arguments.stages) * len(arguments.sizes)) as advance:
@@ -168,11 +246,16 @@ def main() -> None:
             config = presets[name]
             # bf16 is ours to use at the paper's sizes too; the plain version is fp32 by definition.
             reward = replace(config.reward.bootifol, precision="bf16")
-            stages: dict[str, tuple[str, Callable[[], tuple[Work, Work]], int]] = {
+            stages: dict[str, tuple[str, Callable[[], Stage], int]] = {
                 "environment": (
-                    "agent step of the environment (plain: full quality)",
-                    partial(environment_step, config),
+                    "agent step of reacher_hard (plain: full quality)",
+                    partial(environment_step, config, "reacher_hard"),
                     50,
+                ),
+                "meta_world": (
+                    "agent step of button_press (plain: full quality)",
+                    partial(environment_step, config, "button_press"),
+                    20,
                 ),
                 "update": ("sample and RL update", partial(agent_update, config), arguments.runs + 2),
                 "alignment": ("alignment step", partial(alignment_step, config, reward), arguments.runs),
@@ -183,9 +266,19 @@ def main() -> None:
                 ),
             }
             for key in arguments.stages:
-                stage, make, runs = stages[key]
-                ours, plain = medians(*make(), runs, warm_up=1)
-                table.add_row(name, stage, f"{ours:.1f}", f"{plain:.1f}", f"{plain / ours:.1f}")
+                title, make, runs = stages[key]
+                work = make()
+                least = floor(work, rates)
+                ours, plain = medians(work.ours, work.plain, runs, warm_up=1)
+                table.add_row(
+                    name,
+                    title,
+                    f"{ours:.1f}",
+                    f"{plain:.1f}",
+                    f"{plain / ours:.1f}",
+                    "" if least is None else f"{least:.1f}",
+                    "" if least is None else f"{least / ours:.0%}",
+                )
                 advance(1)
     Console().print(table)
 
