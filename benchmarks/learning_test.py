@@ -29,7 +29,7 @@ from bootifol.evaluation.tables import read_evaluations
 from bootifol.experts import make_random
 from bootifol.files import written_aside
 from bootifol.presets import preset
-from bootifol.reports.plots import RUN_COLORS, RUN_DASHES, house_style
+from bootifol.reports.plots import KIND_COLORS, RUN_COLORS, RUN_DASHES, house_style
 from bootifol.rewards.registry import RewardConfig
 from bootifol.tasks import Task, task_named
 from bootifol.training.components import build_environment
@@ -272,11 +272,10 @@ def draw_curves(rows: Sequence[Row], task: Task, path: Path) -> None:
             steps = sorted(by_steps)
             means = [float(np.mean(by_steps[step])) for step in steps]
             axes.plot(steps, means, color=color, linestyle=dashes, label=method)
-        for row in last_rows(rows, RANDOM)[:1]:
-            axes.axhline(
-                float(row["scaled_return"]), color="#7A7F87", linestyle=":", linewidth=1.2, label=RANDOM
-            )
-        axes.axhline(1.0, color="#0B5394", linewidth=1.0, linestyle=":", label="expert")
+        if random := last_rows(rows, RANDOM):
+            level = float(np.mean([float(row["scaled_return"]) for row in random]))
+            axes.axhline(level, color=KIND_COLORS["random"], linestyle=":", linewidth=1.2, label=RANDOM)
+        axes.axhline(1.0, color=KIND_COLORS["expert"], linewidth=1.0, linestyle=":", label="expert")
         axes.set_xlabel("agent steps")
         axes.set_ylabel("scaled return")
         axes.set_title(
