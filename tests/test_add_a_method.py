@@ -43,9 +43,9 @@ TINY = [
         "demos",
     ),
     *("--pictures.agent-size", "32", "--pictures.video-size", "32", "--agent.encoder", "strided"),
-    *("--alignment.gradient-steps", "40", "--interactive.agent-steps", "180", "--evaluation.every", "180"),
+    *("--alignment.gradient-steps", "40", "--interactive.agent-steps", "120", "--evaluation.every", "120"),
     *("--agent.warm-up-steps", "60", "--agent.update-every", "20", "--agent.batch-size", "8"),
-    *("--demonstrations.share", "0", "--evaluation.showcase-episodes", "1"),
+    *("--interactive.log-every", "60", "--demonstrations.share", "0", "--evaluation.showcase-episodes", "1"),
 ]
 
 
@@ -150,7 +150,7 @@ def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
     play = InteractivePhase.play_episode
 
     def play_and_stop(self: InteractivePhase) -> None:
-        if self.counters.episodes == 3:
+        if self.counters.episodes == 2:
             os.kill(os.getpid(), signal.SIGTERM)
         play(self)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from benchmarks import learning_test
 from bootifol.demos.record import record_demos
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
+from bootifol.presets import DRAWN
 from bootifol.rewards.registry import METHODS, RewardConfig, check_method
 from bootifol.tasks import task_named
 
@@ -46,6 +48,8 @@ def test_it_trains_evaluates_and_goes_on_where_it_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "path", list(sys.path))
+    few = replace(DRAWN, evaluation=replace(DRAWN.evaluation, final_episodes=8))
+    monkeypatch.setattr(learning_test, "preset", lambda name: few)
     record_demos("drawn_home", tmp_path / "demos", episodes=12, pictures=PictureConfig(32, 32))
     words = [
         "--demos",
@@ -59,10 +63,10 @@ def test_it_trains_evaluates_and_goes_on_where_it_stopped(
     learning_test.main(tiny)
     rows = learning_test.read_rows(tmp_path / "m.csv")
     assert [(each["method"], each["agent_steps"], each["episodes"]) for each in rows] == [
-        ("virl", "60", "50"),
-        ("random", "0", "50"),
+        ("virl", "60", "8"),
+        ("random", "0", "8"),
     ]
-    assert abs(float(rows[1]["scaled_return"])) < 0.1
+    assert abs(float(rows[1]["scaled_return"])) < 0.3
     assert (tmp_path / "m.png").stat().st_size > 1000
     assert (tmp_path / "m.md").read_text().count("\n") == 4
     check_method("optimal_transport:OptimalTransport")  # the page's file lies where a run will look for it
