@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
@@ -26,7 +26,7 @@ def preset_of(words: list[str]) -> TrainingConfig:
 def train(
     config: Annotated[TrainingConfig, tyro.conf.arg(name="")],
     task: str = "reacher_hard",
-    method: Literal["bootifol", "virl", "context_translation", "gaifo", "environment"] = "bootifol",
+    method: str = "bootifol",
     preset: PresetName = "cpu",
     demos: Path | None = None,
     out: Path | None = None,
@@ -41,7 +41,7 @@ def train(
         task: The environment to act in: a name that `bootifol tasks` lists, gymnasium:ID, or MODULE:FUNCTION, which
             returns a Gymnasium environment.
         method: bootifol, virl, context_translation and gaifo learn a reward from the videos; environment uses the true
-            reward, as an upper bound.
+            reward, as an upper bound. MODULE:NAME is a method of your own (docs/add_a_method.md).
         preset: paper: its hyperparameters to the digit. cpu: 2 cores, within 3 hours. demo: what `make demo` runs, with
             a time budget of minutes. drawn: the tasks drawn with numpy, in two minutes. smoke: every stage, in under
             two minutes.

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import atexit
-import importlib
 import os
 import sys
-import traceback
 import warnings
 import weakref
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -19,6 +16,7 @@ from gymnasium.wrappers import TimeLimit
 from bootifol.envs.camera import prepare_opengl
 from bootifol.envs.pictures import PictureConfig, centered_square
 from bootifol.errors import BootifolError
+from bootifol.own_modules import is_own_name, own_callable, told, where
 from bootifol.types import Action, Frame
 
 PREFIX = "gymnasium:"
@@ -89,7 +87,7 @@ class GymnasiumSimulator:
             picture = self.environment.render()
         except Exception as error:  # each renderer fails with exceptions of its own
             raise BootifolError(
-                f"{self.name} cannot render pictures here: {_told(error)} (is a package missing, or OpenGL? "
+                f"{self.name} cannot render pictures here: {told(error)} (is a package missing, or OpenGL? "
                 "`bootifol doctor` tries the latter)"
             ) from error
         if not (
@@ -180,53 +178,34 @@ def _registered(name: str) -> Environment:
             )
     except gymnasium.error.UnregisteredEnv as error:
         raise BootifolError(
-            f"Gymnasium has no environment '{identifier}' ({_told(error).rstrip('.')}); if another package registers "
+            f"Gymnasium has no environment '{identifier}' ({told(error).rstrip('.')}); if another package registers "
             f"it, name that package too: {PREFIX}PACKAGE:{identifier.rpartition(':')[2]}"
         ) from error
     except (ImportError, gymnasium.error.DependencyNotInstalled) as error:
         raise BootifolError(
-            f"{name} needs a package that is missing: {_told(error).rstrip('.')}; install it (`pip install "
+            f"{name} needs a package that is missing: {told(error).rstrip('.')}; install it (`pip install "
             "'bootifol[gymnasium]'` brings what Gymnasium's own classic control and MuJoCo environments need)"
         ) from error
     except TypeError as error:
         if "render_mode" in str(error):
             raise _no_pictures(name, "its constructor takes no render_mode") from error
-        raise BootifolError(f"{name} cannot be made: {_told(error)}") from error
+        raise BootifolError(f"{name} cannot be made: {told(error)}") from error
     except Exception as error:  # an environment may do anything when it is made
-        raise BootifolError(f"{name} cannot be made: {_told(error)}") from error
+        raise BootifolError(f"{name} cannot be made: {told(error)}") from error
     return environment
 
 
 def _made_by_function(name: str) -> Environment:
-    module_name, _, function_name = name.partition(":")
-    if not function_name.isidentifier() or not all(part.isidentifier() for part in module_name.split(".")):
+    if not is_own_name(name):
         raise BootifolError(
             f"'{name}' names no environment: write {PREFIX}ID, such as {PREFIX}Pendulum-v1, or MODULE:FUNCTION, "
             "such as my_package.my_module:make"
         )
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
-    try:
-        module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        if error.name is not None and f"{module_name}.".startswith(f"{error.name}."):
-            raise BootifolError(
-                f"there is no module {error.name} for {name}, neither in {here} nor among the installed packages: "
-                "go to the directory it lies in, or install it"
-            ) from error
-        raise BootifolError(f"{name} needs a package that is missing: {_told(error)}; install it") from error
-    except Exception as error:  # a module may do anything when it is imported
-        raise BootifolError(f"{module_name} cannot be imported: {_told(error)}{_where(error)}") from error
-    function = getattr(module, function_name, None)
-    if not callable(function):
-        own = [key for key, value in vars(module).items() if _is_own_function(value, module_name)]
-        there = f"; it has {', '.join(own)}" if own else ""
-        raise BootifolError(f"the module {module_name} has no function {function_name}{there}")
+    function = own_callable(name, "function")
     try:
         made = function()
     except Exception as error:  # a function may do anything
-        raise BootifolError(f"{name} failed: {_told(error)}{_where(error)}") from error
+        raise BootifolError(f"{name} failed: {told(error)}{where(error)}") from error
     if not isinstance(made, gymnasium.Env):
         raise BootifolError(
             f"{name} returned {type(made).__name__}, not a gymnasium.Env: return the environment itself, made with "
@@ -290,19 +269,3 @@ def _close_at_exit(simulator: GymnasiumSimulator) -> None:
 def _close_simulators() -> None:
     for simulator in list(_open_simulators):
         simulator.close()
-
-
-def _told(error: BaseException) -> str:
-    """What an exception says, in one line; its type where it says nothing."""
-    text = " ".join(str(error).split())
-    return text or type(error).__name__
-
-
-def _where(error: BaseException) -> str:
-    """File and line that an exception comes from."""
-    last = traceback.extract_tb(error.__traceback__)[-1]
-    return f" ({type(error).__name__} in {Path(last.filename).name}, line {last.lineno})"
-
-
-def _is_own_function(value: object, module_name: str) -> bool:
-    return callable(value) and getattr(value, "__module__", None) == module_name

@@ -1,10 +1,14 @@
-"""The reward methods by name. To add one: a folder beside this file, a field and a line here."""
+"""The reward methods by name, and anyone's own as `MODULE:NAME` (docs/add_a_method.md).
+
+To add one to the library: a folder beside this file, a field and a line here.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 from bootifol.errors import BootifolError
+from bootifol.own_modules import is_own_name, own_callable
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
@@ -13,6 +17,7 @@ from bootifol.rewards.context_translation.model import ContextTranslationRewardM
 from bootifol.rewards.environment import EnvironmentRewardModel
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.gaifo.model import GaifoRewardModel
+from bootifol.rewards.own import own_reward_model
 from bootifol.rewards.virl.config import VirlConfig
 from bootifol.rewards.virl.model import VirlRewardModel
 
@@ -43,14 +48,32 @@ class RewardConfig:
     """GAIfO's discriminator."""
 
 
+def check_method(method: str) -> None:
+    """Refuses a method that cannot be made, before anything is written; imports the module of one's own.
+
+    Args:
+        method: a key of METHODS, or `MODULE:NAME`.
+
+    Raises:
+        BootifolError: there is no such method, or its module cannot be imported.
+    """
+    if is_own_name(method):
+        own_callable(method, "reward method")
+    elif method not in METHODS:
+        raise BootifolError(
+            f"there is no reward method {method!r}; choose one of {', '.join(METHODS)}, or write MODULE:NAME for one "
+            "of your own"
+        )
+
+
 def make_reward_model(
     method: str, config: RewardConfig, video_size: int, seed: int, device: str = "cpu"
 ) -> RewardModel:
     """The reward model of a method.
 
     Args:
-        method: a key of METHODS.
-        config: of all methods.
+        method: a key of METHODS, or `MODULE:NAME`, which is called with (video_size, seed, device).
+        config: of the methods in METHODS; one's own has its settings in its own module.
         video_size: side of the videos in pixels.
         seed: of its parameters and draws.
         device: where to compute, as PyTorch names it.
@@ -58,6 +81,7 @@ def make_reward_model(
     Raises:
         BootifolError: there is no such method, or it cannot read videos of that size.
     """
+    check_method(method)
     if method == "bootifol":
         return BootifolRewardModel(config.bootifol, video_size, seed, device)
     if method == "virl":
@@ -68,4 +92,4 @@ def make_reward_model(
         return GaifoRewardModel(config.gaifo, video_size, seed, device)
     if method == "environment":
         return EnvironmentRewardModel()
-    raise BootifolError(f"there is no reward method {method!r}; choose one of {', '.join(METHODS)}")
+    return own_reward_model(method, video_size, seed, device)

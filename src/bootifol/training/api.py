@@ -55,7 +55,8 @@ def train_policy(
         task: from the catalogue, or `gymnasium:ID`, or `module:function`.
         demos: directory of the videos.
         out: directory of the run, new or empty.
-        method: bootifol, virl, context_translation, gaifo, or environment for the upper bound.
+        method: bootifol, virl, context_translation, gaifo, environment for the upper bound, or `module:name` for
+            one of your own.
         preset: paper, cpu, demo, drawn or smoke.
         seed: of everything random.
         time_budget: seconds of wall-clock time for learning; None for the configuration's agent steps.

@@ -28,6 +28,7 @@ from bootifol.evaluation.tables import append_evaluations, append_ranking
 from bootifol.experts import make_expert, make_random
 from bootifol.memory import keep_freed_memory
 from bootifol.progress import progress
+from bootifol.rewards.registry import check_method
 from bootifol.tracking import Averages, Tracker
 from bootifol.training.alignment import alignment_phase
 from bootifol.training.budget import Budget, Counters, Stopwatch
@@ -66,6 +67,7 @@ class Run:
         torch.set_num_threads(config.threads)
         keep_freed_memory()
         self.task = self.run.resolved_task()
+        check_method(self.run.method)
         self.demos = open_demos(self.run, self.console)
         self.environment = build_environment(self.run, self.task.episode_steps)
         self.components = build_components(self.run, self.environment, self.demos.expert, self.console)

@@ -45,7 +45,7 @@ class GaifoRewardModel(LearnedRewardModel[GaifoConfig, Discriminator]):
         return self._step(expert, agent)
 
     def label(self, video: Video, references: Sequence[Video] = ()) -> Rewards:
-        """`r_t` of the logit of the stack that ends at frame t + 1; references are not looked at.
+        """`r_{t+1}`, from the logit of the stack that ends at frame t + 1; references are not looked at.
 
         Raises:
             BootifolError: the video has another size than the model was made for.

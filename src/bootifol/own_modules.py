@@ -1,0 +1,68 @@
+"""What users write in modules of their own and name as `MODULE:NAME`: environments and reward methods."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bootifol.errors import BootifolError
+
+
+def is_own_name(name: str) -> bool:
+    """Whether a name has the form MODULE:NAME, such as my_package.my_module:make."""
+    module_name, colon, attribute = name.partition(":")
+    return bool(colon) and all(part.isidentifier() for part in (*module_name.split("."), attribute))
+
+
+def own_callable(name: str, kind: str) -> Callable[..., Any]:
+    """Imports what a user's `MODULE:NAME` names; the module may lie in the current directory.
+
+    Args:
+        name: for which `is_own_name` holds.
+        kind: what it should be, for messages.
+
+    Raises:
+        BootifolError: there is no such module, it cannot be imported, or it has nothing callable of that name.
+    """
+    module_name, _, attribute = name.partition(":")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        if error.name is not None and f"{module_name}.".startswith(f"{error.name}."):
+            raise BootifolError(
+                f"there is no module {error.name} for {name}, neither in {here} nor among the installed packages: "
+                "go to the directory it lies in, or install it"
+            ) from error
+        raise BootifolError(f"{name} needs a package that is missing: {told(error)}; install it") from error
+    except Exception as error:  # a module may do anything when it is imported
+        raise BootifolError(f"{module_name} cannot be imported: {told(error)}{where(error)}") from error
+    found = getattr(module, attribute, None)
+    if not callable(found):
+        own = [key for key, value in vars(module).items() if _is_own(value, module_name)]
+        there = f"; it has {', '.join(own)}" if own else ""
+        raise BootifolError(f"the module {module_name} has no {kind} {attribute}{there}")
+    made: Callable[..., Any] = found
+    return made
+
+
+def told(error: BaseException) -> str:
+    """What an exception says, in one line; its type where it says nothing."""
+    text = " ".join(str(error).split())
+    return text or type(error).__name__
+
+
+def where(error: BaseException) -> str:
+    """File and line that an exception comes from."""
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f" ({type(error).__name__} in {Path(last.filename).name}, line {last.lineno})"
+
+
+def _is_own(value: object, module_name: str) -> bool:
+    return callable(value) and getattr(value, "__module__", None) == module_name
