@@ -69,6 +69,7 @@ class RunQueue:
         demos: directory of the demo sets, one a task; missing ones are recorded.
         workers: runs side by side, each on a core of its own.
         time_budget: of each run, such as "60m"; None for the agent steps of its configuration.
+        videos: expert videos to record where there are none; by default what the preset wants.
         program: the command that `train` and `demos record` are words to.
         say: prints a line.
 
@@ -83,6 +84,7 @@ class RunQueue:
         demos: Path,
         workers: int = 1,
         time_budget: str | None = None,
+        videos: int | None = None,
         program: Sequence[str] = PROGRAM,
         say: Callable[[str], None] = print,
     ) -> None:
@@ -90,6 +92,7 @@ class RunQueue:
         self.out = out
         self.demos = demos
         self.time_budget = time_budget
+        self.videos = videos
         self.program = program
         self.say = say
         self._cores = cores(workers)
@@ -153,7 +156,7 @@ class RunQueue:
                 return []
             if error:
                 for failed in [other for other in ready if other.task == task]:
-                    self._fail(failed, f"its videos could not be recorded: {error}")
+                    self._fail(failed, f"its videos could not be recorded: {error}", log_file(directory))
                     ready.remove(failed)
         return ready
 
@@ -168,7 +171,7 @@ class RunQueue:
         """Records demo sets; the sentence of what went wrong, or nothing."""
         pictures = run.config.pictures
         words = ["demos", "record", "--task", run.task, "--out", str(directory)]
-        words += ["--episodes", str(VIDEOS[run.preset]), "--workers", str(len(self._cores))]
+        words += ["--episodes", str(self.videos or VIDEOS[run.preset]), "--workers", str(len(self._cores))]
         words += ["--agent-size", str(pictures.agent_size), "--video-size", str(pictures.video_size)]
         words += ["--profile", pictures.profile, "--behaviors", *behaviors]
         process, log_begins = self._start([*self.program, *words], log_file(directory), lock)
@@ -243,13 +246,13 @@ class RunQueue:
         elif self._stopping or not error:
             self.say(f"{'stopped':10} {ended.run.name}: the same command goes on with it")
         else:
-            self._fail(ended.run, error)
+            self._fail(ended.run, error, log_file(directory))
 
-    def _fail(self, run: PlannedRun, error: str) -> None:
+    def _fail(self, run: PlannedRun, error: str, log: Path) -> None:
         directory = self.directory(run)
         directory.parent.mkdir(parents=True, exist_ok=True)
         error_file(directory).write_text(f"{error}\n")
-        self.say(f"{'failed':10} {run.name}: {error} (see {log_file(directory)})")
+        self.say(f"{'failed':10} {run.name}: {error} (see {log})")
 
     def _time_left(self, waiting: Sequence[PlannedRun]) -> float | None:
         """Seconds until all runs have learned, if each takes as long as those that are done; None before the first."""

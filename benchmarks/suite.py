@@ -60,6 +60,7 @@ def parser() -> argparse.ArgumentParser:
         "--workers", type=int, default=1, help="runs side by side, each on a core of its own (1)"
     )
     made.add_argument("--time-budget", help="of each run, such as 60m; by default the preset's agent steps")
+    made.add_argument("--videos", type=int, help="expert videos to record where there are none")
     made.add_argument("--preset", choices=list(PRESETS), help="instead of the suite's")
     made.add_argument("--tasks", nargs="+", help="instead of the suite's")
     made.add_argument("--seeds", type=int, nargs="+", help="instead of the suite's")
@@ -87,8 +88,9 @@ def _work(arguments: argparse.Namespace, program: Sequence[str]) -> int:
         arguments.demos,
         arguments.workers,
         arguments.time_budget,
+        arguments.videos,
         program,
-        lambda line: print(line, flush=True),
+        say=lambda line: print(line, flush=True),
     )
     outcome = queue.work()
     print(f"{outcome} of {len(runs)} runs in {out}")

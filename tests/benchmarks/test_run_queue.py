@@ -105,9 +105,21 @@ def test_more_workers_than_cores_are_refused(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_tasks_without_videos_fail_alone(suite: Path) -> None:
     runs = [*planned("bootifol", task="hopper_stand"), *planned("bootifol")]
-    assert str(queue(suite, runs).work()) == "1 done, 1 failed, 0 left"
+    lines: list[str] = []
+    assert str(queue(suite, runs, lines=lines).work()) == "1 done, 1 failed, 0 left"
     error = run_state(suite / "out" / "hopper_stand" / "bootifol" / "seed1").error
     assert error == "its videos could not be recorded: no expert is bundled for hopper_stand"
+    assert any(line.endswith(f"(see {suite / 'demos' / 'hopper_stand.log'})") for line in lines)
+
+
+def test_as_many_videos_are_recorded_as_wanted(suite: Path) -> None:
+    queue(suite, planned("bootifol")).work()
+    other = RunQueue(
+        planned("environment"), suite / "out", suite / "more", videos=7, program=FAKE, say=lambda _: None
+    )
+    other.work()
+    recorded = [line for line in (suite / "calls.txt").read_text().splitlines() if line.startswith("record")]
+    assert recorded == ["record drawn_home 12 at 64", "record drawn_home 7 at 64"]
 
 
 def test_imported_videos_are_used_and_random_ones_recorded_beside_them(suite: Path, demo_set: Path) -> None:
