@@ -10,20 +10,18 @@ keep their history. Acting always sees whole stacks. Finished rows are kept: the
 from __future__ import annotations
 
 import argparse
-import csv
 from pathlib import Path
 
 import numpy as np
 import torch
 from rich.console import Console
-from rich.table import Table
 
+from benchmarks.resumable_table import ResumableTable
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.envs.rollout import play_episode
 from bootifol.evaluation.returns import evaluate
 from bootifol.experts import make_expert
-from bootifol.files import written_aside
 from bootifol.presets import preset
 from bootifol.progress import progress
 from bootifol.replay.buffer import ReplayBuffer
@@ -75,26 +73,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
     torch.set_num_threads(arguments.threads)
-    rows: list[dict[str, str]] = []
-    if arguments.out.exists():
-        with arguments.out.open(newline="") as file:
-            rows = list(csv.DictReader(file))
-    done = {(row["variant"], row["seed"]) for row in rows}
+    results = ResumableTable(arguments.out, COLUMNS)
     config = preset(arguments.preset)
     episodes = expert_episodes(arguments.task, config, arguments.videos, arguments.seed)
     for variant in arguments.variants:
-        if (variant, str(arguments.seed)) in done:
-            continue
-        rows.append(cloned(variant, episodes, config, arguments))
-        arguments.out.parent.mkdir(parents=True, exist_ok=True)
-        with written_aside(arguments.out) as aside, aside.open("w", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS)
-            writer.writeheader()
-            writer.writerows(rows)
-    table = Table(*COLUMNS)
-    for row in rows:
-        table.add_row(*(row[column] for column in COLUMNS))
-    Console().print(table)
+        if not results.has(variant, arguments.seed):
+            results.add(cloned(variant, episodes, config, arguments))
+    Console().print(results.shown())
 
 
 def expert_episodes(task: str, config: TrainingConfig, count: int, seed: int) -> list[Episode]:

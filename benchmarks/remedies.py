@@ -14,7 +14,6 @@ the same command goes on where it stopped.
 from __future__ import annotations
 
 import argparse
-import csv
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,12 +23,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.resumable_table import ResumableTable
 from bootifol.agents.drqv2 import DrQv2Config
 from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
 from bootifol.evaluation.returns import evaluate, scaled_return
 from bootifol.evaluation.summary import summarize
-from bootifol.files import written_aside
 from bootifol.presets import preset
 from bootifol.rewards.registry import RewardConfig
 from bootifol.tasks import make_environment, task_named
@@ -109,28 +108,19 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    rows: list[dict[str, str]] = []
-    if arguments.out.exists():
-        with arguments.out.open(newline="") as file:
-            rows = list(csv.DictReader(file))
-    done = {(row["variant"], row["seed"]) for row in rows}
+    results = ResumableTable(arguments.out, COLUMNS)
     console = Console()
     for seed in arguments.seeds:
         for variant in arguments.variants:
-            if (variant, str(seed)) in done:
+            if results.has(variant, seed):
                 continue
             with tempfile.TemporaryDirectory() as temporary:
                 directory = (
                     Path(temporary) if arguments.runs is None else arguments.runs / slug(variant, seed)
                 )
-                rows.append(trained(arguments, variant, seed, directory))
-            console.print(rows[-1])
-            with written_aside(arguments.out) as aside, aside.open("w", newline="") as file:
-                writer = csv.DictWriter(file, COLUMNS)
-                writer.writeheader()
-                writer.writerows(rows)
-    console.print(table(rows))
+                results.add(trained(arguments, variant, seed, directory))
+            console.print(results.rows[-1])
+    console.print(table(results.rows))
 
 
 def slug(variant: str, seed: int) -> str:

@@ -50,4 +50,4 @@ def test_training_knows_no_method_by_name() -> None:
 
 def test_every_area_has_a_place() -> None:
     areas = {path.stem if path.is_file() else path.name for path in PACKAGE.iterdir()}
-    assert areas - {"__init__", "__pycache__", "py"} <= set(LAYERS) | SHARED | ABOVE
+    assert areas - {"__init__", "__main__", "__pycache__", "py"} <= set(LAYERS) | SHARED | ABOVE

@@ -143,6 +143,15 @@ def test_metrics_written_after_the_checkpoint_are_undone(
     assert metrics.read_text() == written
 
 
+def test_metrics_of_a_run_that_died_before_its_first_checkpoint_are_undone(
+    tmp_path: Path, demos: Path
+) -> None:
+    new_run(tmp_path / "run", demos)
+    (tmp_path / "run" / "metrics.jsonl").write_text('{"phase": "alignment", "gradient_step": 2}\n')
+    resumed(tmp_path / "run")
+    assert (tmp_path / "run" / "metrics.jsonl").read_text() == ""
+
+
 def test_a_full_disk_during_a_checkpoint_leaves_the_last_good_one(
     tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -69,8 +69,14 @@ WITH_DEMONSTRATIONS = replace(
 )
 """The same, starting as a clone of the expert videos."""
 
+ENCODING_BASED = replace(
+    WITH_DEMONSTRATIONS, agent=replace(WITH_DEMONSTRATIONS.agent, observations="encodings")
+)
+"""The same, with an agent that sees the reward model's encodings instead of pictures."""
+
 RUNS = [
     pytest.param("bootifol", TINY, id="paper"),
+    pytest.param("bootifol", ENCODING_BASED, id="encoding_based"),
     *(pytest.param(method, WITH_DEMONSTRATIONS, id=method) for method in METHODS),
 ]
 """Method and configuration of what must hold for every method: cloning asks the reward for more than acting does."""

@@ -18,11 +18,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from bootifol.agents.networks import Actor, Critic, Encoder, EncoderName, initialize
+from bootifol.agents.encodings import FrameEncodings
+from bootifol.agents.networks import Actor, Critic, Encoder, EncoderName, EncodingEncoder, initialize
 from bootifol.errors import BootifolError, require_at_least
 from bootifol.types import Action, Arrays, Batch, Metrics, Observation
 
 Precision = Literal["bf16", "fp32"]
+Observations = Literal["pictures", "encodings"]
 
 SATURATED = 0.98
 """Mean actions beyond this are counted as saturated in the metrics."""
@@ -31,6 +33,11 @@ SATURATED = 0.98
 @dataclass(frozen=True)
 class DrQv2Config:
     """DrQ-v2; the defaults are those of its paper, with the replay of the BootIfOL paper."""
+
+    observations: Observations = "pictures"
+    """pictures: convolutions of the agent's own read the frames (the paper's agent). encodings: an MLP reads what the
+    reward model's frame encoder makes of them, always its newest version and without a random shift (the paper's
+    ablation of it); for reward methods that encode single frames."""
 
     encoder: EncoderName = "paper"
     """Convolutions over the frame stack. paper: four 3x3 layers of 32 channels, strides 2, 1, 1, 1.
@@ -102,7 +109,11 @@ class DrQv2Config:
     """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""
 
     def __post_init__(self) -> None:
-        for name, choices in (("encoder", get_args(EncoderName)), ("precision", get_args(Precision))):
+        for name, choices in (
+            ("observations", get_args(Observations)),
+            ("encoder", get_args(EncoderName)),
+            ("precision", get_args(Precision)),
+        ):
             if getattr(self, name) not in choices:
                 raise BootifolError(
                     f"agent {name} must be one of {', '.join(choices)}, not {getattr(self, name)}"
@@ -197,9 +208,10 @@ class DrQv2:
         action_dim: action dimensions.
         seed: of the initial parameters and of the noise.
         device: where the networks live.
+        encodings: what turns pictures into encodings where the configuration says so; None otherwise.
 
     Raises:
-        BootifolError: the frames are too small for the encoder.
+        BootifolError: the frames are too small for the encoder, or there are no encodings to act on.
     """
 
     def __init__(
@@ -210,16 +222,13 @@ class DrQv2:
         action_dim: int,
         seed: int,
         device: str = "cpu",
+        encodings: FrameEncodings | None = None,
     ) -> None:
         self.config = config
         self._device = torch.device(device)
+        self._encodings = encodings if config.observations == "encodings" else None
         with torch.device("meta"):  # torch's own initialization would draw from the global generator
-            self.encoder = Encoder(config.encoder, 3 * stack, frame_size)
-            if self.encoder.feature_count == 0:
-                raise BootifolError(
-                    f"frames of {frame_size}x{frame_size} pixels are too small for the agent's "
-                    f"{config.encoder!r} encoder; make them larger or choose another encoder"
-                )
+            self.encoder = self._make_encoder(3 * stack, frame_size)
             sizes = (self.encoder.feature_count, action_dim, config.feature_dim, config.hidden_dim)
             self.actor = Actor(*sizes)
             self.critic = Critic(*sizes)
@@ -232,7 +241,7 @@ class DrQv2:
         _to_channels_last(self.encoder)
         self.target_critic.load_state_dict(self.critic.state_dict())
         self.target_critic.requires_grad_(False)
-        self._averaged: tuple[Encoder, Actor] | None = None
+        self._averaged: tuple[Encoder | EncodingEncoder, Actor] | None = None
         if config.averaging > 0:
             self._averaged = copy.deepcopy(self.encoder), copy.deepcopy(self.actor)
         self._generator = torch.Generator(self._device).manual_seed(int(start.initial_seed()) + 1)
@@ -243,6 +252,22 @@ class DrQv2:
         self._cloning_optimizer = torch.optim.Adam(
             [*self.encoder.parameters(), *self.actor.parameters()], config.learning_rate, fused=True
         )
+
+    def _make_encoder(self, channels: int, frame_size: int) -> Encoder | EncodingEncoder:
+        if self._encodings is not None:
+            return EncodingEncoder(self._encodings.size, self.config.hidden_dim)
+        if self.config.observations == "encodings":
+            raise BootifolError(
+                "agent.observations encodings needs a reward model whose encodings the agent reads; "
+                "without one use agent.observations pictures"
+            )
+        encoder = Encoder(self.config.encoder, channels, frame_size)
+        if encoder.feature_count == 0:
+            raise BootifolError(
+                f"frames of {frame_size}x{frame_size} pixels are too small for the agent's "
+                f"{self.config.encoder!r} encoder; make them larger or choose another encoder"
+            )
+        return encoder
 
     def act(self, observation: Observation, agent_steps: float, explore: bool) -> Action:
         """One action.
@@ -256,10 +281,10 @@ class DrQv2:
             float32 `[A]` in [-1, 1].
         """
         with torch.inference_mode():
-            picture = torch.from_numpy(observation).to(self._device).permute(2, 0, 1).unsqueeze(0)
+            picture = torch.from_numpy(observation).permute(2, 0, 1).unsqueeze(0)
             newest = self.encoder, self.actor
             encoder, actor = newest if explore or self._averaged is None else self._averaged
-            mean = actor(encoder(picture.float()))
+            mean = actor(encoder(self._network_input(picture, torch.float32)))
             if explore:
                 mean = noisy_action(mean, self.config.exploration(agent_steps), None, self._generator)
             return _to_numpy(mean[0])
@@ -274,8 +299,9 @@ class DrQv2:
         Raises:
             BootifolError: the loss is NaN or infinite; the parameters are as before.
         """
+        observation = self._network_input(batch.observation, self._precision)
         with self._autocast():
-            action = self.actor(self.encoder(self._network_input(batch.observation)))
+            action = self.actor(self.encoder(observation))
         loss = cloning_loss(action, batch.action.to(self._device))
         self._cloning_optimizer.param_groups[0]["lr"] = learning_rate
         self._step(self._cloning_optimizer, loss, "cloning")
@@ -289,8 +315,8 @@ class DrQv2:
             BootifolError: a loss is NaN or infinite; the parameters are as before the step that failed.
         """
         stddev = self.config.exploration(agent_steps)
-        observation = self._network_input(batch.observation)
-        next_observation = self._network_input(batch.next_observation)
+        observation = self._network_input(batch.observation, self._precision)
+        next_observation = self._network_input(batch.next_observation, self._precision)
         action, reward, discount = (
             tensor.to(self._device) for tensor in (batch.action, batch.reward, batch.discount)
         )
@@ -412,9 +438,15 @@ class DrQv2:
                 if any(parameter is held for held in optimizer.param_groups[0]["params"]):
                     yield name, prefix, optimizer.state[parameter]
 
-    def _network_input(self, observation: Tensor) -> Tensor:
-        dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32
+    def _network_input(self, observation: Tensor, dtype: torch.dtype) -> Tensor:
+        """What the encoder reads of pictures uint8 `[B, 3 * stack, S, S]`: they themselves, or their encodings."""
+        if self._encodings is not None:
+            observation = self._encodings(observation)
         return observation.to(self._device, dtype)
+
+    @property
+    def _precision(self) -> torch.dtype:
+        return torch.bfloat16 if self.config.precision == "bf16" else torch.float32
 
     def _autocast(self) -> torch.autocast:
         return torch.autocast(self._device.type, torch.bfloat16, enabled=self.config.precision == "bf16")

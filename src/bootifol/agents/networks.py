@@ -1,4 +1,4 @@
-"""The networks of DrQ-v2 (Yarats et al., 2021): image encoder, actor, twin critic, and how they start."""
+"""The networks of DrQ-v2 (Yarats et al., 2021): encoder, actor, twin critic, and how they start."""
 
 from __future__ import annotations
 
@@ -53,6 +53,27 @@ class Encoder(nn.Module):
         for convolution in self.rest:
             features = convolution(features).relu_()
         return features.permute(0, 2, 3, 1).flatten(1)
+
+
+class EncodingEncoder(nn.Sequential):
+    """The MLP of the paper's encoding-based agent, shared by actor and critics in place of the convolutions.
+
+    The first layer is normalized: encodings have no fixed scale, and theirs moves while the reward learns.
+
+    Args:
+        inputs: numbers in a stack of encodings.
+        hidden_dim: width of both layers, and number of features.
+    """
+
+    def __init__(self, inputs: int, hidden_dim: int) -> None:
+        super().__init__(
+            nn.Linear(inputs, hidden_dim),
+            nn.LayerNorm(hidden_dim),
+            nn.ReLU(),
+            nn.Linear(hidden_dim, hidden_dim),
+            nn.ReLU(),
+        )
+        self.feature_count = hidden_dim
 
 
 class Trunk(nn.Sequential):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
-from bootifol.types import Arrays, Metrics, Rewards, Video, VideoSource
+from torch import Tensor
+
+from bootifol.types import Arrays, Frames, Metrics, Rewards, Video, VideoSource
 
 
 class RewardModel(Protocol):
@@ -56,3 +58,18 @@ class RewardModel(Protocol):
         ...
 
     def load_state(self, arrays: Arrays) -> None: ...
+
+
+@runtime_checkable
+class EncodesFrames(Protocol):
+    """What a reward model also implements where an agent can act on its encodings (`agents/encodings.py`)."""
+
+    encoding_dim: int
+    """Z: numbers that stand for a frame."""
+
+    video_size: int
+    """Side of the frames it encodes, in pixels."""
+
+    def encode_frames(self, frames: Frames) -> Tensor:
+        """Encodings float32 `[N, Z]` of single frames uint8 `[N, S, S, 3]`, each by itself, without gradients."""
+        ...

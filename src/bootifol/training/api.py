@@ -117,8 +117,10 @@ def evaluate_run(directory: Path | str, episodes: int = 10, seed: int = 1000) ->
     run = RunConfig.read(Path(directory))
     task = run.resolved_task()
     environment = build_environment(run, task.evaluation_steps)
-    agent = build_agent(run, environment)
-    load_checkpoint(_newest(Path(directory)), {"agent": agent})
+    reward_model = build_reward_model(run)
+    agent = build_agent(run, environment, reward_model)
+    # Some agents see through the reward model.
+    load_checkpoint(_newest(Path(directory)), {"reward_model": reward_model, "agent": agent})
     results = evaluate_act(
         environment,
         lambda observation: agent.act(observation, run.training.interactive.agent_steps, explore=False),

@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from bootifol.agents.drqv2 import DrQv2
+from bootifol.agents.encodings import FrameEncodings
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.demos.check import differences
@@ -20,7 +21,7 @@ from bootifol.demos.record import record
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import KINDS
 from bootifol.replay.buffer import ReplayBuffer
-from bootifol.rewards.base import RewardModel
+from bootifol.rewards.base import EncodesFrames, RewardModel
 from bootifol.rewards.registry import make_reward_model
 from bootifol.tasks import make_environment
 from bootifol.training.checkpoint import Stateful
@@ -74,8 +75,13 @@ def build_reward_model(run: RunConfig) -> RewardModel:
     return make_reward_model(run.method, run.training.reward, run.training.pictures.video_size, run.seed)
 
 
-def build_agent(run: RunConfig, environment: gymnasium.Env[Any, Any]) -> DrQv2:
-    """The agent, untrained."""
+def build_agent(run: RunConfig, environment: gymnasium.Env[Any, Any], reward_model: RewardModel) -> DrQv2:
+    """The agent, untrained. The reward model is the run's; an encoding-based agent sees through it.
+
+    Raises:
+        BootifolError: the agent shall act on encodings, and the reward model has none for its pictures.
+    """
+    encodings = _encodings(run, reward_model) if _sees_encodings(run) else None
     assert isinstance(environment.action_space, gymnasium.spaces.Box)
     pictures = run.training.pictures
     return DrQv2(
@@ -84,7 +90,32 @@ def build_agent(run: RunConfig, environment: gymnasium.Env[Any, Any]) -> DrQv2:
         pictures.stack,
         environment.action_space.shape[0],
         run.seed,
+        encodings=encodings,
     )
+
+
+def _sees_encodings(run: RunConfig) -> bool:
+    return run.training.agent.observations == "encodings"
+
+
+def _encodings(run: RunConfig, reward_model: RewardModel) -> FrameEncodings:
+    pictures = run.training.pictures
+    if not isinstance(reward_model, EncodesFrames):
+        raise BootifolError(
+            f"agent.observations encodings needs a method that encodes single frames, which {run.method} does not: "
+            "choose --method bootifol, or --agent.observations pictures"
+        )
+    if pictures.agent_size < pictures.video_size:
+        raise BootifolError(
+            f"the agent's pictures have {pictures.agent_size} pixels, too few for the reward model to encode, which "
+            f"reads {pictures.video_size}: pass --pictures.agent-size {pictures.video_size}"
+        )
+    return FrameEncodings(reward_model, pictures.stack)
+
+
+def _shift(run: RunConfig) -> int:
+    """Of the pictures that replay gives out; encodings are of whole pictures."""
+    return 0 if _sees_encodings(run) else run.training.agent.shift
 
 
 def demonstrated_videos(run: RunConfig, expert: VideoSource) -> int:
@@ -104,7 +135,7 @@ def build_demonstrations(run: RunConfig, expert: VideoSource, action_dim: int) -
         pictures.stack,
         agent.n_step,
         agent.discount,
-        agent.shift,
+        _shift(run),
     )
     inverse_dynamics = InverseDynamics(
         agent.encoder, pictures.agent_size, pictures.stack, agent.n_step, action_dim, run.seed
@@ -136,7 +167,7 @@ def build_components(
     console.print(f"memory when full: {', '.join(parts)}")
     return Components(
         reward_model=reward_model,
-        agent=build_agent(run, environment),
+        agent=build_agent(run, environment, reward_model),
         replay=ReplayBuffer(
             config.agent.replay_capacity,
             pictures.agent_size,
@@ -144,7 +175,7 @@ def build_components(
             pictures.stack,
             config.agent.n_step,
             config.agent.discount,
-            config.agent.shift,
+            _shift(run),
         ),
         agent_videos=AgentVideos(config.interactive.agent_videos, frames, pictures.video_size),
         demonstrations=build_demonstrations(run, expert, action_dim) if demonstrated else None,

@@ -333,18 +333,22 @@ class Run:
     def _resume(self) -> None:
         checkpoint = newest_checkpoint(self.directory / "checkpoints")
         if checkpoint is None:
+            self._undo_metrics_after(0)
             return
         saved = load_checkpoint(checkpoint, self.components.stateful())
         self.counters = saved.counters
         self.rng = restore_generator(saved.random_state)
-        metrics = self.directory / "metrics.jsonl"
-        if metrics.exists():
-            with metrics.open("r+b") as file:
-                file.truncate(saved.metrics_bytes)
+        self._undo_metrics_after(saved.metrics_bytes)
         self.console.print(
             f"resuming {self.directory} after {self.counters.alignment_steps:,} alignment steps and "
             f"{self.counters.agent_steps:,} agent steps"
         )
+
+    def _undo_metrics_after(self, bytes_kept: int) -> None:
+        metrics = self.directory / "metrics.jsonl"
+        if metrics.exists():
+            with metrics.open("r+b") as file:
+                file.truncate(bytes_kept)
 
     def _checkpoint_if_due(self) -> None:
         if time.monotonic() - self._saved_at > 60 * self.run.training.checkpoint_minutes:

@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from bootifol.networks.color import lab_views
+from bootifol.networks.frame_encoders import STATE_SIZE
 from bootifol.rewards.bootifol import losses
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.networks import BootifolNetworks
@@ -31,6 +32,7 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
     """
 
     keeps_learning = False
+    encoding_dim = STATE_SIZE
 
     def __init__(self, config: BootifolConfig, video_size: int, seed: int, device: str = "cpu") -> None:
         super().__init__(BootifolNetworks, config, video_size, seed, device)
@@ -72,6 +74,11 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         """Encodings z of every prefix of a video: `[T + 1, H, W, 3]` to `[T + 1, 128]`."""
         encoding: NDArray[np.float32] = self._encode([frames])[0].numpy()
         return encoding
+
+    def encode_frames(self, frames: Frames) -> torch.Tensor:
+        """s = g(o) of single frames: uint8 `[N, H, W, 3]` to float32 `[N, 128]`, without gradients."""
+        states = self._frame_states(self._checked(frames))
+        return states.clone()  # one that autograd may keep, which a tensor of inference mode is not
 
     def state(self) -> Arrays:
         """What every reward model has, and the reward scale."""
@@ -165,12 +172,16 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
 
     def _encode(self, videos: Sequence[Frames]) -> list[torch.Tensor]:
         """Encodings `[T + 1, 128]` of each video, in evaluation mode: a frame's state depends on that frame alone."""
-        frames = np.concatenate([self._checked(video) for video in videos])
+        states = self._frame_states(np.concatenate([self._checked(video) for video in videos]))
         with self._evaluating():
-            with self._autocast():
-                states = self.networks.frame_encoder(*self._views(frames)).float()
-            parts = states.split([len(video) for video in videos])
+            parts = torch.split(states, [len(video) for video in videos])
             return [self.networks.sequence_encoder(part[None])[0][0].cpu() for part in parts]
+
+    def _frame_states(self, frames: Frames) -> torch.Tensor:
+        """s `[N, 128]` of frames uint8 `[N, H, W, 3]`, in evaluation mode."""
+        with self._evaluating(), self._autocast():
+            states: torch.Tensor = self.networks.frame_encoder(*self._views(frames)).float()
+            return states
 
     def _views(self, frames: Frames) -> tuple[torch.Tensor, torch.Tensor]:
         """uint8 `[N, H, W, 3]` to the views L `[N, 1, H, W]` and ab `[N, 2, H, W]`."""

@@ -1,0 +1,277 @@
+"""What does each method cost? Seconds per 1000 agent steps, peak memory, and parameters, each in a fresh process.
+
+    python -m benchmarks.cost --preset cpu --task reacher_hard --out results/reacher_hard/cost_cpu.csv
+
+Measured is the Interactive Phase with everything in it: acting, rendering, updates of agent and reward, rewarding
+each episode. Alignment, cloning and evaluation are not. Before the clock starts, a few gradient steps of alignment, a
+warm-up, one step of inverse dynamics and two episodes pass. Finished rows are kept: the same command goes on where it
+stopped. A Markdown table is written beside the CSV file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import torch
+from rich.console import Console
+
+from benchmarks.resumable_table import ResumableTable
+from benchmarks.run_queue import PROGRAM, missing_demos
+from benchmarks.suites import (
+    RANDOM,
+    VIDEOS,
+    System,
+    every_system,
+    policy_input_ablation,
+    with_overrides,
+)
+from bootifol.demos.agent_videos import AgentVideos
+from bootifol.errors import BootifolError
+from bootifol.files import written_aside
+from bootifol.presets import PRESETS, preset
+from bootifol.replay.buffer import ReplayBuffer
+from bootifol.tasks import short_name
+from bootifol.training.alignment import alignment_phase
+from bootifol.training.cloning import cloning_phase
+from bootifol.training.config import TrainingConfig
+from bootifol.training.run_config import RunConfig
+from bootifol.training.train import Run
+
+COLUMNS = {
+    "task": "task",
+    "preset": "preset",
+    "system": "system",
+    "threads": "threads",
+    "agent_steps": "agent steps timed",
+    "seconds_learning": "s per 1000 agent steps, reward learning",
+    "cpu_seconds_learning": "of them CPU time",
+    "seconds_resting": "s per 1000 agent steps, reward at rest",
+    "cpu_seconds_resting": "of them CPU time",
+    "peak_memory_mb": "peak memory, MB",
+    "stores_mb": "stores when full, MB",
+    "reward_parameters": "parameters of the reward",
+    "agent_parameters": "parameters of the agent",
+}
+"""Of the CSV file, and what they are called in Markdown."""
+
+ALIGNMENT_STEPS = 3
+FEW_VIDEOS = 40
+"""Recorded where the task has none, and used as demonstrations."""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--task", default="reacher_hard")
+    parser.add_argument("--preset", default="cpu", choices=list(PRESETS))
+    parser.add_argument("--steps", type=int, default=600, help="agent steps to time, twice")
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--systems", nargs="+", help="by name; all by default")
+    parser.add_argument(
+        "--demos", type=Path, default=Path("demos"), help="directory of the videos, one a task"
+    )
+    parser.add_argument("--out", type=Path, help="results/TASK/cost_PRESET.csv")
+    parser.add_argument("--measure", help=argparse.SUPPRESS)  # what the fresh process does
+    arguments = parser.parse_args()
+    try:
+        if arguments.measure is not None:
+            system = systems(arguments.preset, [arguments.measure])[0]
+            print(json.dumps(measured(arguments, system)))
+        else:
+            compare(arguments)
+    except BootifolError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def systems(preset_name: str, names: Sequence[str] | None) -> list[System]:
+    """The systems of the paper's tables that learn, and the encoding-based agent, by name.
+
+    Raises:
+        BootifolError: there is none of a name.
+    """
+    known = {
+        system.name: system
+        for list_systems in (every_system, policy_input_ablation)
+        for system in list_systems(preset(preset_name), timed=False)
+        if system.method != RANDOM
+    }
+    for name in names or ():
+        if name not in known:
+            raise BootifolError(f"there is no system '{name}'; the systems are {', '.join(known)}")
+    return [known[name] for name in names or known]
+
+
+def compare(arguments: argparse.Namespace) -> None:
+    """Measures what is not in the table yet, one fresh process after another."""
+    task = short_name(arguments.task)
+    out = arguments.out or Path("results") / task / f"cost_{arguments.preset}.csv"
+    results = ResumableTable(out, tuple(COLUMNS), key=3)
+    missing = [
+        system
+        for system in systems(arguments.preset, arguments.systems)
+        if not results.has(arguments.task, arguments.preset, system.name)
+    ]
+    with tempfile.TemporaryDirectory() as temporary:
+        demos = arguments.demos / task
+        if missing and missing_demos(demos):
+            demos = Path(temporary) / "demos"
+            record(arguments.task, preset(arguments.preset), demos)
+        for number, system in enumerate(missing, start=1):
+            print(f"measuring {system.name} ({number} of {len(missing)})", file=sys.stderr, flush=True)
+            words = ["--task", arguments.task, "--preset", arguments.preset, "--demos", str(demos)]
+            words += ["--steps", str(arguments.steps), "--threads", str(arguments.threads)]
+            command = [sys.executable, "-m", "benchmarks.cost", *words, "--measure", system.name]
+            finished = subprocess.run(command, stdout=subprocess.PIPE, text=True)
+            if finished.returncode:
+                raise BootifolError(f"{system.name} could not be measured: its own message is above")
+            results.add(json.loads(finished.stdout.splitlines()[-1]))
+    table = markdown(results.rows)
+    with written_aside(out.with_suffix(".md")) as aside:
+        aside.write_text(table)
+    print(table, end="")
+
+
+def record(task: str, config: TrainingConfig, directory: Path) -> None:
+    """A few videos, which cost as much to learn from as many."""
+    pictures = config.pictures
+    words = ["demos", "record", "--task", task, "--episodes", str(FEW_VIDEOS), "--out", str(directory)]
+    words += ["--agent-size", str(pictures.agent_size), "--video-size", str(pictures.video_size)]
+    words += ["--profile", pictures.profile, "--behaviors", "expert", "random"]
+    if subprocess.run([*PROGRAM, *words]).returncode:
+        raise BootifolError(f"there are no videos of {task} and none could be recorded: see above")
+
+
+def measured(arguments: argparse.Namespace, system: System) -> dict[str, str]:
+    """A row of the table: one method in this process."""
+    config = replace(with_overrides(preset(arguments.preset), system.overrides), threads=arguments.threads)
+    with tempfile.TemporaryDirectory() as temporary:
+        described = RunConfig(
+            arguments.task, system.method, arguments.preset, 1, str(arguments.demos), None, shortened(config)
+        )
+        run = Run(described, Path(temporary), Console(quiet=True))
+        prepare(run)
+        learning = seconds_per_1000(run, arguments.steps)
+        run.interactive.config = replace(run.interactive.config, reward_updates_until=0)
+        resting = seconds_per_1000(run, arguments.steps)
+        reward, agent = run.components.reward_model, run.components.agent
+        return {
+            "task": arguments.task,
+            "preset": arguments.preset,
+            "system": system.name,
+            "threads": str(arguments.threads),
+            "agent_steps": str(arguments.steps),
+            "seconds_learning": f"{learning.wall_clock:.1f}",
+            "cpu_seconds_learning": f"{learning.cpu:.1f}",
+            "seconds_resting": f"{resting.wall_clock:.1f}",
+            "cpu_seconds_resting": f"{resting.cpu:.1f}",
+            "peak_memory_mb": f"{peak_memory() / 1e6:.0f}",
+            "stores_mb": f"{stores_when_full(config, run) / 1e6:.0f}",
+            "reward_parameters": str(parameters([getattr(reward, "networks", None)])),
+            "agent_parameters": str(parameters([agent.encoder, agent.actor, agent.critic])),
+        }
+
+
+def shortened(config: TrainingConfig) -> TrainingConfig:
+    """The same work an agent step, with next to nothing before it."""
+    demonstrations = replace(
+        config.demonstrations, phases=1, inverse_dynamics_updates=1, cloning_updates=0, videos=FEW_VIDEOS
+    )
+    return replace(
+        config,
+        alignment=replace(config.alignment, gradient_steps=ALIGNMENT_STEPS),
+        agent=replace(config.agent, warm_up_steps=1),
+        demonstrations=demonstrations,
+        evaluation=replace(config.evaluation, held_out_videos=0),
+        tensorboard=False,
+    )
+
+
+def prepare(run: Run) -> None:
+    """What comes before the phase that is measured: alignment, warm-up, cloning, and whatever compiles at first."""
+    parts, counters = run.components, run.counters
+    for _ in alignment_phase(parts.reward_model, run.demos.expert, run.demos.random, run.budget, counters):
+        pass
+    for _ in range(2):
+        run.interactive.play_episode()
+        if run.interactive.cloning_due:
+            assert parts.demonstrations is not None
+            for _ in cloning_phase(
+                parts.agent,
+                parts.demonstrations,
+                parts.replay,
+                parts.reward_model,
+                run.rng,
+                run.budget,
+                counters,
+            ):
+                pass
+
+
+class Seconds(NamedTuple):
+    """Per 1000 agent steps. Less CPU time than threads times wall-clock: the machine was busy with other work."""
+
+    wall_clock: float
+    cpu: float
+
+
+def seconds_per_1000(run: Run, agent_steps: int) -> Seconds:
+    """Plays whole episodes, as many as have so many agent steps, after one that is not timed."""
+    run.interactive.play_episode()
+    first, started, cpu_started = run.counters.agent_steps, time.perf_counter(), time.process_time()
+    while run.counters.agent_steps - first < agent_steps:
+        run.interactive.play_episode()
+    thousands = (run.counters.agent_steps - first) / 1000
+    return Seconds(
+        (time.perf_counter() - started) / thousands, (time.process_time() - cpu_started) / thousands
+    )
+
+
+def peak_memory() -> int:
+    """Bytes of memory that this process had at most.
+
+    Not `ru_maxrss`, which on Linux begins with what the process that started this one had.
+    """
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmHWM:"):
+            return 1024 * int(line.split()[1])
+    raise BootifolError("/proc/self/status tells no VmHWM: peak memory is measured on Linux alone")
+
+
+def stores_when_full(config: TrainingConfig, run: Run) -> int:
+    """Bytes of the frames that a whole run of a suite keeps, of which a short one fills next to nothing."""
+    size, frames = config.pictures.agent_size, run.task.episode_steps + 1
+    action_dim = run.interactive.environment.action_space.shape or (0,)
+    replay = ReplayBuffer.bytes_needed(config.agent.replay_capacity, size, action_dim[0])
+    videos = AgentVideos.bytes_needed(config.interactive.agent_videos, frames, config.pictures.video_size)
+    demonstrated = 0
+    if run.components.demonstrations is not None:
+        count = min(config.demonstrations.videos, VIDEOS[run.run.preset])
+        demonstrated = ReplayBuffer.bytes_needed(count * frames, size, action_dim[0])
+    return replay + videos + demonstrated
+
+
+def parameters(networks: Iterable[torch.nn.Module | None]) -> int:
+    """How many numbers they learn."""
+    return sum(p.numel() for network in networks if network is not None for p in network.parameters())
+
+
+def markdown(rows: Sequence[Mapping[str, str]]) -> str:
+    """The table for a page."""
+    lines = [list(COLUMNS.values()), ["---"] * len(COLUMNS), *([*row.values()] for row in rows)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

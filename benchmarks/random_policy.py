@@ -1,0 +1,74 @@
+"""Random actions, evaluated and written down like a run: the lower end of the scale in tables and figures.
+
+    python -m benchmarks.random_policy --task reacher_hard --demos demos/reacher_hard --out runs/random
+
+It takes the words of `bootifol train`; nothing is learned, so there are no checkpoints and no curves.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from bootifol.cli.train import preset_of
+from bootifol.envs.rollout import Act
+from bootifol.evaluation.returns import EpisodeResult, evaluate, evaluation_rows
+from bootifol.evaluation.tables import append_evaluations
+from bootifol.experts import make_random
+from bootifol.progress import progress
+from bootifol.reports.html import report
+from bootifol.training.components import build_environment
+from bootifol.training.config import TrainingConfig
+from bootifol.training.interactive import evaluation_seeds
+from bootifol.training.run_config import RunConfig
+
+
+def play(
+    config: Annotated[TrainingConfig, tyro.conf.arg(name="")],
+    demos: Path,
+    out: Path,
+    task: str = "reacher_hard",
+    method: str = "random",
+    preset: str = "cpu",
+    seed: int = 1,
+    time_budget: str | None = None,
+) -> None:
+    """Plays the final evaluation of a run with random actions; `method` and `time_budget` change nothing."""
+    run = RunConfig(task, "random", preset, seed, str(demos), None, config)
+    run.write(out, ["python", "-m", "benchmarks.random_policy", *sys.argv[1:]])
+    resolved = run.resolved_task()
+    environment = build_environment(run, resolved.evaluation_steps)
+    act: Act = make_random(environment, seed)
+    results: list[EpisodeResult] = []
+    with progress("random actions", config.evaluation.final_episodes) as advance:
+        for start in evaluation_seeds(seed, config.evaluation.final_episodes):
+            results += evaluate(environment, act, [start])
+            advance(1)
+    environment.close()
+    rows = evaluation_rows(
+        results,
+        agent_steps=0,
+        seconds=0.0,
+        episode_steps=resolved.evaluation_steps,
+        expert_return=resolved.expert_return,
+        random_return=resolved.random_return,
+    )
+    append_evaluations(out / "evaluations.csv", rows)
+    report([out], out / "report.html")
+
+
+def main() -> None:
+    words = sys.argv[1:]
+    tyro.cli(
+        functools.partial(play, config=preset_of(words)),
+        args=words,
+        config=(tyro.conf.FlagConversionOff, tyro.conf.AvoidSubcommands),
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,292 @@
+"""What the paper compares, as lists of runs: systems, tasks and seeds under equal terms.
+
+A run is one `bootifol train` command. All runs of a task learn from the same videos, with the same agent, budget and
+evaluation; what a system changes of its preset is written here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from bootifol.errors import BootifolError
+from bootifol.presets import PAPER, preset
+from bootifol.tasks import short_name, task_named
+from bootifol.training.config import TrainingConfig
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Section = TypeVar("Section", bound="DataclassInstance")
+Value = str | int | float | bool
+Overrides = tuple[tuple[str, Value], ...]
+"""Fields by their place in the configuration, such as `("alignment.gradient_steps", 0)`, and their values."""
+
+RANDOM = "random"
+"""The lower end of the scale: it learns nothing, so `benchmarks/random_policy.py` plays it instead of `train`."""
+
+
+@dataclass(frozen=True)
+class System:
+    """What is compared: a method, or a variant of it."""
+
+    method: str
+    variant: str = ""
+    overrides: Overrides = ()
+
+    @property
+    def name(self) -> str:
+        """METHOD or METHOD-VARIANT."""
+        return f"{self.method}-{self.variant}" if self.variant else self.method
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One run of a suite."""
+
+    task: str
+    preset: str
+    system: System
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """TASK/METHOD[-VARIANT]/seedN, also its directory."""
+        return f"{short_name(self.task)}/{self.system.name}/seed{self.seed}"
+
+    @property
+    def config(self) -> TrainingConfig:
+        """The whole configuration that `words` describes."""
+        return with_overrides(preset(self.preset), (*self.system.overrides, ("threads", 1)))
+
+    def words(self, demos: Path, out: Path, time_budget: str | None) -> list[str]:
+        """The words after `bootifol train`."""
+        words = ["--task", self.task, "--method", self.system.method, "--preset", self.preset]
+        words += ["--seed", str(self.seed), "--demos", str(demos), "--out", str(out), "--threads", "1"]
+        words += [] if time_budget is None else ["--time-budget", time_budget]
+        for field, value in self.system.overrides:
+            words += [f"--{field.replace('_', '-')}", str(value)]
+        return words
+
+
+def with_overrides(config: TrainingConfig, overrides: Overrides) -> TrainingConfig:
+    """The configuration with some of its fields replaced, those of one section together.
+
+    Raises:
+        BootifolError: the values are not allowed.
+    """
+    nested: dict[str, dict[str, Value]] = {}
+    for field, value in overrides:
+        section, _, name = field.rpartition(".")
+        nested.setdefault(section, {})[name] = value
+    for section, values in nested.items():
+        config = _replaced(config, section.split(".") if section else [], values)
+    return config
+
+
+def _replaced(config: Section, path: list[str], values: dict[str, Value]) -> Section:
+    if not path:
+        return dataclasses.replace(config, **values)
+    inner = _replaced(getattr(config, path[0]), path[1:], values)
+    return dataclasses.replace(config, **{path[0]: inner})
+
+
+def every_system(config: TrainingConfig, timed: bool) -> list[System]:
+    """Every system of the paper's tables: its method, those it compares with, and both ends of the scale."""
+    cosine = (("reward.bootifol.reward", "cosine"), ("reward.bootifol.reward_scale", "none"))
+    references = "reward.context_translation.references"
+    return [
+        System("bootifol"),
+        System("bootifol", "cosine", cosine),
+        System("virl"),
+        System("gaifo"),
+        System("context_translation", "n1", ((references, 1),)),
+        System("context_translation", "n10", ((references, 10),)),
+        System("environment"),
+        System(RANDOM),
+    ]
+
+
+def alignment_ablation(config: TrainingConfig, timed: bool) -> list[System]:
+    """The paper's `alignment`, `no-alignment` and `no-alignment-1550K-step`."""
+    without = ("alignment.gradient_steps", 0)
+    to_the_end = ("interactive.reward_updates_until", config.interactive.agent_steps)
+    return [
+        System("bootifol"),
+        System("bootifol", "no_alignment", (without,)),
+        System("bootifol", "no_alignment_to_the_end", (without, to_the_end)),
+    ]
+
+
+def encoder_training_ablation(config: TrainingConfig, timed: bool) -> list[System]:
+    """N_train = 0, 100K, 375K and 1550K of the paper's 1550K agent steps, or the same shares of a shorter run."""
+    systems = []
+    for agent_steps in (0, 100_000, 375_000, 1_550_000):
+        percent = round(100 * agent_steps / PAPER.interactive.agent_steps)
+        until = equivalent_steps(config, agent_steps, timed)
+        systems.append(
+            System("bootifol", f"trained_{percent}_percent", (("interactive.reward_updates_until", until),))
+        )
+    return systems
+
+
+def equivalent_steps(config: TrainingConfig, paper_steps: int, timed: bool) -> int:
+    """N_train of a run that trains its encoders for the same share of its learning as the paper's did.
+
+    Learning begins after the warm-up, which is 0.1 % of the paper's run and a fifth of `cpu`: so shares are of the
+    agent steps that follow it. With a time budget, schedules follow the time, of which a warm-up takes next to nothing.
+
+    Args:
+        config: of the run.
+        paper_steps: N_train in the paper's run.
+        timed: whether the run has a time budget.
+    """
+    if paper_steps == 0:
+        return 0
+    total, of_paper = config.interactive.agent_steps, PAPER.interactive.agent_steps
+    if timed:
+        return round(total * paper_steps / of_paper)
+    before, before_of_paper = config.agent.warm_up_steps, PAPER.agent.warm_up_steps
+    return before + round((total - before) * (paper_steps - before_of_paper) / (of_paper - before_of_paper))
+
+
+def policy_input_ablation(config: TrainingConfig, timed: bool) -> list[System]:
+    """The image-based and the encoding-based agent."""
+    return [System("bootifol"), System("bootifol", "encodings", (("agent.observations", "encodings"),))]
+
+
+SMALL: Overrides = (
+    ("pictures.agent_size", 32),
+    ("pictures.video_size", 32),
+    ("reward.bootifol.width_divisor", 32),
+    ("reward.bootifol.videos_per_class", 2),
+    ("agent.encoder", "strided"),
+    ("agent.update_every", 10),
+    ("agent.batch_size", 8),
+    ("agent.warm_up_steps", 60),
+    ("alignment.gradient_steps", 4),
+    ("interactive.agent_steps", 240),
+    ("tensorboard", False),
+)
+
+
+def smallest(config: TrainingConfig, timed: bool) -> list[System]:
+    """A method, and both ends of the scale, in seconds."""
+    return [System(method, overrides=SMALL) for method in ("bootifol", "environment", RANDOM)]
+
+
+@dataclass(frozen=True)
+class Suite:
+    """A named list of runs."""
+
+    description: str
+    preset: str
+    tasks: tuple[str, ...]
+    seeds: tuple[int, ...]
+    systems: Callable[[TrainingConfig, bool], list[System]]
+    """From the preset, and whether runs have a time budget."""
+
+    def runs(
+        self,
+        preset_name: str | None = None,
+        tasks: Sequence[str] | None = None,
+        seeds: Sequence[int] | None = None,
+        timed: bool = False,
+    ) -> list[PlannedRun]:
+        """Its runs, the first seed of everything first.
+
+        Args:
+            preset_name: instead of its own.
+            tasks: instead of its own.
+            seeds: instead of its own.
+            timed: whether each run has a time budget.
+
+        Raises:
+            BootifolError: there is no such preset or task, or the preset does not allow what a system changes.
+        """
+        name = preset_name or self.preset
+        systems = self.systems(preset(name), timed)
+        runs = [
+            PlannedRun(task, name, system, seed)
+            for seed in seeds or self.seeds
+            for task in tasks or self.tasks
+            for system in systems
+        ]
+        for task in tasks or self.tasks:
+            task_named(task)
+        for system in systems:
+            with_overrides(preset(name), system.overrides)
+        return runs
+
+
+SEVEN_TASKS = (
+    "reacher_hard",
+    "finger_turn_easy",
+    "hopper_stand",
+    "walker_run",
+    "button_press",
+    "plate_slide",
+    "drawer_close",
+)
+FIVE_SEEDS = (1, 2, 3, 4, 5)
+THREE_SEEDS = (1, 2, 3)
+_ablation = partial(Suite, preset="cpu", tasks=("reacher_hard",), seeds=THREE_SEEDS)
+
+SUITES = {
+    "reacher": Suite("every system on Reacher Hard", "cpu", ("reacher_hard",), (1,), every_system),
+    "paper": Suite(
+        "the paper's tables: seven tasks, every system, five seeds, the paper's sizes",
+        "paper",
+        SEVEN_TASKS,
+        FIVE_SEEDS,
+        every_system,
+    ),
+    "cpu": Suite(
+        "the same with the preset cpu, about an hour a run", "cpu", SEVEN_TASKS, FIVE_SEEDS, every_system
+    ),
+    "alignment": _ablation(
+        "ablation: with, without, and without the Alignment Phase but trained to the end",
+        systems=alignment_ablation,
+    ),
+    "encoder_training": _ablation(
+        "ablation: how long the encoders learn while the agent acts", systems=encoder_training_ablation
+    ),
+    "policy_input": _ablation(
+        "ablation: a policy that sees pictures, or the reward model's encodings of them",
+        systems=policy_input_ablation,
+    ),
+    "drawn": Suite(
+        "every system on a task drawn with numpy, minutes a run",
+        "drawn",
+        ("drawn_home",),
+        THREE_SEEDS,
+        every_system,
+    ),
+    "smoke": Suite("three runs of seconds, which learn nothing", "smoke", ("drawn_home",), (1,), smallest),
+}
+
+VIDEOS = {"paper": 5032, "cpu": 1000, "demo": 700, "drawn": 150, "smoke": 12}
+"""Expert videos to record for each preset. The paper learns from 5000; up to 32 are held out to see how they rank."""
+
+
+def named(name: str) -> Suite:
+    """Looks a suite up.
+
+    Raises:
+        BootifolError: there is none of that name.
+    """
+    if name not in SUITES:
+        raise BootifolError(f"there is no suite '{name}'; the suites are {', '.join(SUITES)}")
+    return SUITES[name]
+
+
+def tasks_of(runs: Iterable[PlannedRun]) -> dict[str, PlannedRun]:
+    """The tasks of some runs, each with its first run, which says how its videos must look."""
+    first: dict[str, PlannedRun] = {}
+    for run in runs:
+        first.setdefault(run.task, run)
+    return first

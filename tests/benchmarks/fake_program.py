@@ -1,0 +1,78 @@
+"""Stands for `bootifol` in tests of the queue: does at once, or fails to do, what the method's name says.
+
+Every call is written to `calls.txt` in the working directory, as are the core and the threads that it was given.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import shutil
+import signal
+import sys
+import time
+from pathlib import Path
+
+
+def main(words: list[str]) -> int:
+    values = dict(itertools.pairwise(words))
+    if words[:2] == ["demos", "record"]:
+        note(f"record {values['--task']} {values['--episodes']} at {values['--video-size']}")
+        if values["--task"] == "hopper_stand":
+            print("error: no expert is bundled for hopper_stand", file=sys.stderr)
+            return 2
+        for behavior in words[words.index("--behaviors") + 1 :]:
+            shutil.copytree(os.environ["FAKE_DEMOS"], Path(values["--out"]) / behavior, dirs_exist_ok=True)
+        return 0
+    resumes = "--resume" in values
+    out = Path(values["--resume"] if resumes else values["--out"])
+    core = ",".join(map(str, sorted(os.sched_getaffinity(0)))) if hasattr(os, "sched_getaffinity") else ""
+    note(
+        f"{'resume' if resumes else 'train'} {out.parent.name}/{out.name} {os.environ['OMP_NUM_THREADS']} {core}"
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    if not resumes:
+        header = {name: values[f"--{name}"] for name in ("task", "method", "preset")}
+        config = {"seed": int(values["--seed"]), "time_budget": None, "config": {}}
+        (out / "config.json").write_text(json.dumps(header | config))
+    method = json.loads((out / "config.json").read_text())["method"]
+    if method == "gaifo":
+        print("a line before\nerror: the loss is nan\n", file=sys.stderr)
+        return 2
+    if method == "virl" and not resumes:
+        return interrupted_twice() if os.environ.get("FAKE_CTRL_C") == "twice" else interrupted_once(out)
+    (out / "metrics.jsonl").write_text('{"phase": "interactive", "agent_steps": 240, "seconds": 12.5}\n')
+    (out / "report.html").write_text("a report")
+    return 0
+
+
+def note(line: str) -> None:
+    with Path("calls.txt").open("a") as file:
+        file.write(f"{line}\n")
+
+
+def interrupted_once(out: Path) -> int:
+    """Ctrl-C reaches the queue; waits for it to ask for an end, and writes a checkpoint."""
+
+    def write_checkpoint(*_: object) -> None:
+        (out / "checkpoints").mkdir()
+
+    signal.signal(signal.SIGTERM, write_checkpoint)
+    os.kill(os.getppid(), signal.SIGINT)
+    while not (out / "checkpoints").exists():
+        time.sleep(0.01)
+    return 0
+
+
+def interrupted_twice() -> int:
+    """Does not listen, so that Ctrl-C is pressed again once the queue has asked for an end."""
+    signal.signal(signal.SIGTERM, lambda *_: os.kill(os.getppid(), signal.SIGINT))
+    Path("pid.txt").write_text(str(os.getpid()))
+    os.kill(os.getppid(), signal.SIGINT)
+    while True:
+        time.sleep(0.01)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

@@ -1,0 +1,78 @@
+"""The table of costs: what is counted, and that it is gone on with. Times are not asserted."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from argparse import Namespace
+from pathlib import Path
+
+import pytest
+import torch
+from benchmarks.suites import SMALL, System
+
+from benchmarks import cost
+from bootifol.demos.record import record
+from bootifol.envs.pictures import PictureConfig
+from bootifol.errors import BootifolError
+
+ROW = dict.fromkeys(cost.COLUMNS, "1")
+
+
+@pytest.fixture(scope="module")
+def demos(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("demos")
+    for behavior in ("expert", "random"):
+        record("drawn_home", behavior, 4, directory / behavior, PictureConfig(agent_size=32, video_size=32))
+    return directory
+
+
+def test_a_row_counts_parameters_and_memory(demos: Path) -> None:
+    arguments = Namespace(task="drawn_home", preset="smoke", threads=1, steps=1, demos=demos)
+    row = cost.measured(arguments, System("environment", overrides=SMALL))
+    assert list(row) == list(cost.COLUMNS)
+    assert row["reward_parameters"] == "0" and int(row["agent_parameters"]) > 0
+    assert float(row["seconds_learning"]) > 0 and int(row["peak_memory_mb"]) > 0
+    # 3000 frames of replay at 32 pixels, actions and reward; 50 videos of 31 frames; no demonstrations
+    assert int(row["stores_mb"]) == round((3000 * (3 * 32**2 + 12) + 50 * 31 * 3 * 32**2) / 1e6)
+
+
+def test_parameters_are_counted_by_hand() -> None:
+    assert cost.parameters([torch.nn.Linear(3, 2), None, torch.nn.LayerNorm(4)]) == 3 * 2 + 2 + 4 + 4
+
+
+def test_only_what_is_missing_is_measured(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured: list[str] = []
+
+    def run(command: list[str], **_: object) -> subprocess.CompletedProcess[str]:
+        measured.append(command[-1])
+        row = ROW | {"task": "drawn_home", "preset": "smoke", "system": command[-1]}
+        code = 2 if measured.count("virl") == 1 and command[-1] == "virl" else 0
+        return subprocess.CompletedProcess(command, code, stdout=f"a line\n{json.dumps(row)}\n")
+
+    monkeypatch.setattr(subprocess, "run", run)
+    (tmp_path / "demos").mkdir()
+    (tmp_path / "demos" / "drawn_home").symlink_to(demos)
+    arguments = Namespace(
+        task="drawn_home",
+        preset="smoke",
+        systems=["gaifo", "virl", "environment"],
+        demos=tmp_path / "demos",
+        steps=1,
+        threads=1,
+        out=tmp_path / "cost.csv",
+    )
+    with pytest.raises(BootifolError, match="virl could not be measured"):
+        cost.compare(arguments)
+    cost.compare(arguments)
+    assert measured == ["gaifo", "virl", "virl", "environment"]
+    table = (tmp_path / "cost.md").read_text().splitlines()
+    assert table[0].startswith("| task | preset | system | threads |") and len(table) == 2 + 3
+
+
+def test_an_unknown_system_is_named() -> None:
+    assert "random" not in [system.name for system in cost.systems("cpu", None)]
+    with pytest.raises(BootifolError, match="there is no system 'magic'; the systems are bootifol,"):
+        cost.systems("cpu", ["magic"])

@@ -1,0 +1,72 @@
+"""Runs whose agent acts on encodings of the reward model; what holds for every run, other files hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+from tiny_runs import ENCODING_BASED, new_run
+
+from bootifol.envs.pictures import PictureConfig
+from bootifol.errors import BootifolError
+from bootifol.training.api import evaluate_run
+from bootifol.training.components import build_agent, build_reward_model
+from bootifol.training.run_config import RunConfig
+from bootifol.training.train import Run
+from bootifol.types import Video
+
+
+def test_a_finished_run_is_evaluated_with_its_own_encoder(tmp_path: Path, demos: Path) -> None:
+    run = new_run(tmp_path / "run", demos, config=ENCODING_BASED)
+    assert run.learn()
+    scores = run.finish()
+    again = evaluate_run(tmp_path / "run", ENCODING_BASED.evaluation.final_episodes, seed=run.run.seed)
+    assert again.summary.mean == scores["evaluation/return_60"]
+
+
+def test_the_encoder_is_taught_by_the_reward_alone(tmp_path: Path, demos: Path) -> None:
+    run = new_run(tmp_path / "run", demos, config=ENCODING_BASED)
+    model, agent, rng = run.components.reward_model, run.components.agent, np.random.default_rng(0)
+    run.interactive.play_episode()
+    before = model.state()
+    agent.update(run.components.replay.sample(8, rng), 0)
+    for name, array in model.state().items():
+        np.testing.assert_array_equal(array, before[name], err_msg=name)
+
+
+def test_replay_gives_whole_pictures(tmp_path: Path, demos: Path) -> None:
+    run = new_run(tmp_path / "run", demos, config=ENCODING_BASED)
+    assert run.components.replay.shift == 0
+    assert run.components.demonstrations is not None
+    assert run.components.demonstrations.replay.shift == 0
+
+
+def test_a_method_without_encodings_is_refused(tmp_path: Path, demos: Path) -> None:
+    with pytest.raises(BootifolError, match=r"which environment does not: choose --method bootifol"):
+        new_run(tmp_path / "run", demos, "environment", ENCODING_BASED)
+
+
+def test_pictures_too_small_to_encode_are_refused(demos: Path) -> None:
+    config = replace(ENCODING_BASED, pictures=PictureConfig(agent_size=16, video_size=32))
+    run = RunConfig("drawn_reach", "bootifol", "smoke", 1, str(demos), None, config)
+    with pytest.raises(BootifolError, match=r"16 pixels.*reads 32: pass --pictures\.agent-size 32"):
+        build_agent(run, None, build_reward_model(run))  # type: ignore[arg-type]
+
+
+def test_without_an_alignment_phase_the_reward_is_still_finite(tmp_path: Path, demos: Path) -> None:
+    config = replace(ENCODING_BASED, alignment=replace(ENCODING_BASED.alignment, gradient_steps=0))
+    run = Run(
+        RunConfig("drawn_reach", "bootifol", "smoke", 1, str(demos), None, config),
+        tmp_path / "run",
+        Console(quiet=True),
+    )
+    assert run.learn()
+    assert run.counters.alignment_steps == 0 < run.counters.reward_updates
+    expert = run.demos.expert
+    rewards = run.components.reward_model.label(
+        Video("agent", expert[0].frames), [expert[index] for index in range(8)]
+    )
+    assert np.isfinite(rewards).all()
