@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
+from bootifol.demos.shards import DAMAGED_ARRAY
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.types import Frame, Frames
@@ -31,10 +31,6 @@ _SMALLEST_SHOWN = 256
 
 # Pixels longer than this are a damaged header, not a format that anyone films in (the widest, anamorphic, is 2).
 _MOST_STRETCHED = 4
-
-
-# What numpy raises on a damaged header, which it reads as a Python literal.
-_DAMAGED_ARRAY = (ValueError, OSError, EOFError, SyntaxError, tokenize.TokenError, MemoryError, TypeError)
 
 
 @dataclass(frozen=True)
@@ -230,7 +226,7 @@ def _natural_order(path: Path) -> list[tuple[int, str]]:
 def _stream_array(path: Path) -> Iterator[TimedFrame]:
     try:
         frames = np.load(path, mmap_mode="r", allow_pickle=False)
-    except _DAMAGED_ARRAY as error:
+    except DAMAGED_ARRAY as error:
         raise BootifolError(f"{path} is damaged or no numpy array: {error}") from error
     if frames.dtype != np.uint8 or frames.ndim != 4 or frames.shape[-1] != 3 or frames.size == 0:
         raise BootifolError(
@@ -255,7 +251,7 @@ def _stream_archive(path: Path) -> Iterator[TimedFrame]:
                 f"width, 3], among {listed or 'nothing'}: save the one video alone"
             )
         frames = np.load(path, allow_pickle=False)[videos[0]]
-    except (*_DAMAGED_ARRAY, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+    except (*DAMAGED_ARRAY, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise BootifolError(f"{path} is damaged or no .npz archive: {error}") from error
     for frame in frames:
         yield TimedFrame(np.array(frame), None)
