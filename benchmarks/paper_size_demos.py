@@ -107,12 +107,15 @@ def recorded(task: str, size: Size, directory: Path, workers: int) -> str:
     if there == size.videos:
         return f"{size.videos} videos were there already"
     videos = size.videos - there
+    described = (
+        f"{videos} videos in {seconds:.0f} s: {videos / seconds:.2f} a second with {workers} worker(s); peak resident "
+        f"memory {status_bytes('VmHWM') / MB:.0f} MB"
+    )
+    if workers == 1:
+        return described
     # Of a process's children the system counts those that have ended; a new one begins with its parent's figure.
     worker = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
-    return (
-        f"{videos} videos in {seconds:.0f} s: {videos / seconds:.2f} a second with {workers} worker(s); peak resident "
-        f"memory {status_bytes('VmHWM') / MB:.0f} MB, and at most {worker / MB:.0f} MB a worker"
-    )
+    return f"{described}, and at most {worker / MB:.0f} MB a worker"
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -155,7 +158,7 @@ def main(words: Sequence[str] | None = None) -> None:
         sys.exit(f"error: {error}")
     except (MemoryError, RuntimeError) as error:
         sys.exit(
-            f"error: learning from {directory} within {arguments.memory} MB failed ({str(error).splitlines()[:1]}): "
+            f"error: learning from {directory} within {arguments.memory} MB failed ({error}): "
             "give it more with --memory"
         )
 

@@ -6,7 +6,8 @@ For each task: expert and random videos are recorded to learn from, and expert, 
 starts, to be ranked. The preset's reward model is aligned on the former and rewards the latter, each against expert
 videos of training as an episode of an agent would be. AUC is the chance that a better video is rewarded above a worse
 one (0.5: a coin); Kendall's tau says the same of all three kinds at once. Intervals are 95 % bootstrap intervals over
-the ranked videos; how much another training would differ they do not tell.
+the ranked videos: how much another training would differ they do not tell, and where every pair is in order they have
+no width.
 
 Beside OUT.csv, OUT_videos.csv holds every video's reward. Tasks that are in them with the same settings are not
 measured again, so the same command goes on where it stopped. Tasks without an expert are named and left out.
@@ -17,7 +18,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -100,8 +101,13 @@ def ranked(task: Task, setup: Setup, demos: Path, workers: int) -> list[RankingR
         setup.seed + HELD_OUT_SEED,
         workers=workers,
     )
+    # Their names are those of the training videos, with the same numbers; caches of encodings go by the name.
     held_out: dict[str, list[Video]] = {
-        kind: [videos[index] for index in range(len(videos))] for kind, videos in aside.items()
+        kind: [
+            replace(video, name=f"held-out-{video.name}")
+            for video in map(videos.__getitem__, range(len(videos)))
+        ]
+        for kind, videos in aside.items()
     }
     model = BootifolRewardModel(config.reward.bootifol, config.pictures.video_size, setup.seed)
     steps = model.align(training["expert"], training["random"])

@@ -154,7 +154,7 @@ def report(tasks: Sequence[Task], rows: Sequence[Row]) -> str:
         there = (
             ("–", "–")
             if paper is None
-            else (f"{mean:g} ± {std:g}" for mean, std in (paper.expert, paper.random))
+            else (f"{mean:.2f} ± {std:.2f}" for mean, std in (paper.expert, paper.random))
         )
         returns.append([name, *(with_interval(row) for row in of_task.values()), *there])
         short = found.get((task.name, "expert", str(task.episode_steps)))
