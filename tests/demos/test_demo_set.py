@@ -1,4 +1,8 @@
 import json
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -6,7 +10,7 @@ import pytest
 from small_demo_sets import FRAMES, SIZE, WriteSet, moving_videos
 
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
-from bootifol.demos.manifest import read_manifest
+from bootifol.demos.manifest import read_manifest, write_manifest
 from bootifol.demos.shards import videos_per_shard
 from bootifol.errors import BootifolError
 
@@ -126,8 +130,88 @@ def test_pickled_arrays_are_never_loaded(write_set: WriteSet) -> None:
     manifest = json.loads((directory / "manifest.json").read_text())
     manifest["shards"][0]["bytes"] = shard.stat().st_size
     edit_manifest(directory, **manifest)
-    with pytest.raises(BootifolError, match=r"shard-00000.npy is damaged"):
+    with pytest.raises(
+        BootifolError, match=r"shard-00000.npy holds object \[1\] where the manifest says uint8"
+    ):
         DemoSet.open(directory)
+
+
+def replace_shard(directory: Path, data: bytes) -> None:
+    """Puts other bytes into the first shard and lets the manifest agree with their number."""
+    manifest = json.loads((directory / "manifest.json").read_text())
+    manifest["shards"][0]["bytes"] = len(data)
+    edit_manifest(directory, shards=manifest["shards"])
+    (directory / "shard-00000.npy").write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda data: b"PK" + data[2:], "is damaged: the magic string is not correct"),
+        (lambda data: data[:6] + b"\2\0" + data[8:], "its format is 2.0"),
+        (lambda data: data[:40], "is damaged: EOF"),
+        (lambda data: data.replace(b"'fortran_order': False", b"'fortran_order': True "), "varies fastest"),
+        (lambda data: data.replace(b"{'descr'", b"{('descr"), "is damaged"),
+        (lambda data: data[:-5], "bytes follow its header, which promises 2,880"),
+    ],
+)
+def test_a_shard_whose_header_is_not_ours_is_refused(
+    write_set: WriteSet, change: Callable[[bytes], bytes], sentence: str
+) -> None:
+    directory = write_set(moving_videos(3))
+    replace_shard(directory, change((directory / "shard-00000.npy").read_bytes()))
+    with pytest.raises(BootifolError, match=f"shard-00000.npy .*{sentence}"):
+        DemoSet.open(directory)
+
+
+def test_a_file_cut_short_or_removed_while_in_use_gives_a_sentence(write_set: WriteSet) -> None:
+    directory = write_set(moving_videos(3))
+    demo_set = DemoSet.open(directory)
+    shard = directory / "shard-00000.npy"
+    shard.write_bytes(shard.read_bytes()[:-1])
+    assert demo_set[1].frames.shape == (FRAMES, SIZE, SIZE, 3)
+    with pytest.raises(BootifolError, match=r"shard-00000.npy has become shorter while it was in use"):
+        demo_set[2]
+    shard.unlink()
+    with pytest.raises(BootifolError, match=r"shard-00000.npy cannot be read any more"):
+        demo_set[1]
+
+
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="only Linux limits the address space reliably"
+)
+def test_a_set_larger_than_memory_is_sampled_in_bounded_memory(write_set: WriteSet) -> None:
+    """A set of 2.1 GB (holes in its files cost no disk), in a process that may take 256 MB more than it has."""
+    import resource
+
+    directory = write_set(np.zeros((4, FRAMES, SIZE, SIZE, 3), np.uint8), per_shard=1)
+    manifest = read_manifest(directory)
+    shape = (700, 61, 64, 64, 3)
+    shards = []
+    for shard in manifest.shards:
+        with (directory / shard.file).open("wb") as file:
+            header = {"descr": "|u1", "fortran_order": False, "shape": shape}
+            np.lib.format.write_array_header_1_0(file, header)
+            file.truncate(file.tell() + math.prod(shape))
+        shards.append(replace(shard, videos=700, bytes=(directory / shard.file).stat().st_size))
+    entries = [replace(manifest.videos[0], name=f"video-{number}", length=61) for number in range(2800)]
+    write_manifest(
+        directory,
+        replace(
+            manifest, episodes=2800, frames=61, video_size=64, shards=tuple(shards), videos=tuple(entries)
+        ),
+    )
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + 256 * 2**20, hard))
+    try:
+        training, held_out = DemoSet.open(directory).split(10)
+        rng = np.random.default_rng(0)
+        read = sum(training.sample(32, rng).nbytes for _ in range(16))
+        assert held_out[3].frames.shape == shape[1:]
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+    assert read > 256 * 2**20
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from benchmarks import learning_test
 
+from benchmarks import learning_test
 from bootifol.demos.record import record_demos
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError

@@ -5,11 +5,15 @@ import pytest
 
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import (
+    _PAIRS,
+    KINDS,
+    _tau_of_pairs,
     area_under_curve,
     draw_references,
     expert_above_random,
     margin,
     rank_videos,
+    ranking_intervals,
     ranking_scores,
 )
 from bootifol.evaluation.tables import RankingRow
@@ -125,3 +129,41 @@ def test_expert_above_random_counts_pairs_and_needs_no_half_good_video() -> None
     assert expert_above_random(rows) == 0.75
     with pytest.raises(BootifolError, match="none of kind random"):
         expert_above_random(rows[:2])
+
+
+def test_intervals_of_a_perfect_order_have_no_width() -> None:
+    rows = rows_of(random=[0, 1, 2], half_good=[3, 4, 5], expert=[6, 7, 8])
+    intervals = ranking_intervals(rows)
+    assert intervals.expert_above_half_good == (1.0, 1.0)
+    assert intervals.expert_above_random == (1.0, 1.0)
+    perfect = ranking_scores(rows).perfect_tau
+    assert intervals.kendall_tau == (pytest.approx(perfect), pytest.approx(perfect))
+
+
+def test_intervals_hold_the_scores_and_narrow_with_more_videos() -> None:
+    rng = np.random.default_rng(0)
+    widths = []
+    for count in (10, 160):
+        drawn = {kind: list(rng.normal(level, 1.0, count)) for level, kind in enumerate(KINDS)}
+        rows = rows_of(**drawn)
+        scores, intervals = ranking_scores(rows), ranking_intervals(rows, resamples=500)
+        for name in ("kendall_tau", "expert_above_half_good", "half_good_above_random"):
+            low, high = getattr(intervals, name)
+            assert low < getattr(scores, name) < high
+        low, high = intervals.kendall_tau
+        widths.append(high - low)
+        assert intervals == ranking_intervals(rows, resamples=500)
+    assert widths[1] == pytest.approx(widths[0] / 4, rel=0.5)
+
+
+def test_tau_follows_from_the_three_areas_where_no_rewards_are_equal() -> None:
+    rng = np.random.default_rng(1)
+    rewards = {kind: rng.normal(size=count) for kind, count in zip(KINDS, (5, 7, 9), strict=True)}
+    pairs = [area_under_curve(rewards[better], rewards[worse]) for better, worse in _PAIRS]
+    scores = ranking_scores(rows_of(**{kind: list(values) for kind, values in rewards.items()}))
+    assert _tau_of_pairs(pairs, rewards) == pytest.approx(scores.kendall_tau)
+
+
+def test_intervals_need_every_kind() -> None:
+    with pytest.raises(BootifolError, match="none of kind half_good"):
+        ranking_intervals(rows_of(random=[0], expert=[1]))

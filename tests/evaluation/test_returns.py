@@ -4,7 +4,15 @@ import pytest
 from bootifol.envs.rollout import PlayedEpisode
 from bootifol.errors import BootifolError
 from bootifol.evaluation import returns
-from bootifol.evaluation.returns import EpisodeResult, evaluate, evaluation_rows, scaled_return
+from bootifol.evaluation.returns import (
+    EpisodeResult,
+    behavior_results,
+    evaluate,
+    evaluation_rows,
+    scaled_return,
+    unseen_environment,
+)
+from bootifol.tasks import TASKS
 from bootifol.types import Episode, Video
 
 
@@ -25,6 +33,20 @@ def test_each_seed_gives_one_result_in_order(monkeypatch: pytest.MonkeyPatch) ->
     results = evaluate(None, None, [3, 1])  # type: ignore[arg-type]
     assert results == [EpisodeResult(3, 30.0, True), EpisodeResult(1, 10.0, False)]
     assert len(set(names)) == 2
+
+
+def test_a_behavior_plays_its_own_seeds_without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    task = TASKS["drawn_reach"]
+    environment = unseen_environment(task, 40)
+    monkeypatch.setattr(environment.simulator, "render", lambda: pytest.fail("nobody looks at the pictures"))
+    results = list(behavior_results("random", task, environment, [5, 6]))
+    assert [result.seed for result in results] == [5, 6]
+    assert results[1:] == list(behavior_results("random", task, environment, [6])), (
+        "episodes do not depend on others"
+    )
+    [expert] = behavior_results("expert", task, environment, [5])
+    assert expert.environment_return > results[0].environment_return
+    assert expert.success
 
 
 def test_without_measured_returns_there_is_no_scale() -> None:

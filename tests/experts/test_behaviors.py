@@ -1,15 +1,18 @@
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bootifol import experts
 from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.pixels import PixelEnvironment
 from bootifol.envs.rollout import play_episode
 from bootifol.errors import BootifolError
 from bootifol.experts import Behavior, make_behavior, make_expert
 from bootifol.experts.behaviors import HalfGood
+from bootifol.experts.policy import StatePolicy
 from bootifol.tasks import make_environment
 from bootifol.types import Action
 
@@ -44,6 +47,24 @@ def half_good_actions(seed: int) -> NDArray[np.float32]:
     act = HalfGood(controller, environment, seed, lambda rng: np.array(WRONG))
     observation, _ = environment.reset(seed=seed)
     return np.stack([act(observation) for _ in range(STEPS)])
+
+
+def test_half_good_is_the_half_trained_policy_where_one_is_bundled(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(experts, "BUNDLED", tmp_path)
+    environment = make_environment("drawn_reach", SMALL, STEPS)
+    monkeypatch.setattr(environment.simulator, "state", lambda: np.array([0.5]), raising=False)
+    StatePolicy([(np.array([[1.0], [-2.0]]), np.zeros(2))]).save(tmp_path / "drawn_reach.safetensors")
+    StatePolicy([(np.array([[4.0], [0.0]]), np.zeros(2))]).save(
+        tmp_path / "drawn_reach.half_trained.safetensors"
+    )
+    observation, _ = environment.reset(seed=0)
+    actions = [
+        make_behavior(behavior, "drawn_reach", environment, 0)(observation)
+        for behavior in ("expert", "half_good")
+    ]
+    np.testing.assert_allclose(actions, np.tanh([[0.5, -1.0], [2.0, 0.0]]), rtol=1e-6)
 
 
 def test_half_good_is_one_of_three_kinds() -> None:

@@ -63,26 +63,20 @@ def _measured(listed: Sequence[Task], episodes: int) -> Table:
     # Imported here: the simulators and scipy would slow down every other command's help.
     import numpy as np
 
-    from bootifol.envs.pictures import PictureConfig
-    from bootifol.evaluation.returns import evaluate
+    from bootifol.evaluation.returns import behavior_results, unseen_environment
     from bootifol.evaluation.summary import summarize
-    from bootifol.experts import Behavior, make_behavior
+    from bootifol.experts import Behavior
     from bootifol.progress import progress
-    from bootifol.tasks import make_environment
 
     behaviors: tuple[Behavior, ...] = ("expert", "random")
-    pictures = PictureConfig(agent_size=8, video_size=8, stack=1)
     table = Table("task", "who", "episodes", "mean return ± std", "95% interval of the mean", "success")
     for task in listed:
-        environment = make_environment(task.name, pictures, task.evaluation_steps)
-        environment.rendered = False
+        environment = unseen_environment(task, task.evaluation_steps)
         for who in behaviors if task.has_expert else behaviors[1:]:
             returns: list[float] = []
             successes: list[bool] = []
             with progress(f"{task.name}, {who}", episodes) as advance:
-                for seed in range(episodes):
-                    act = make_behavior(who, task.name, environment, seed)
-                    [episode] = evaluate(environment, act, [seed])
+                for episode in behavior_results(who, task, environment, range(episodes)):
                     returns.append(episode.environment_return)
                     if episode.success is not None:
                         successes.append(episode.success)

@@ -15,7 +15,7 @@ from bootifol.types import FrameBatch, Video
 
 
 class DemoSet:
-    """Videos of one length and size in a directory; memory-mapped, so that a set may exceed the memory.
+    """Videos of one length and size in a directory; read one by one, so that a set may exceed the memory.
 
     It is a `VideoSource`. All checks that cost nothing run on opening; `verify` also reads every byte.
     """
@@ -26,7 +26,7 @@ class DemoSet:
         self.manifest = manifest
         self._shards = [open_shard(path, shard, manifest) for shard in manifest.shards]
         self._places = [
-            (shard, row) for shard, videos in enumerate(self._shards) for row in range(len(videos))
+            (shard, row) for shard, opened in enumerate(self._shards) for row in range(opened.videos)
         ]
 
     @classmethod
@@ -62,8 +62,7 @@ class DemoSet:
     def __getitem__(self, index: int) -> Video:
         if not 0 <= index < len(self):
             raise IndexError(f"video {index} of {len(self)}")
-        shard, row = self._places[index]
-        return Video(self.manifest.videos[index].name, np.array(self._shards[shard][row]))
+        return Video(self.manifest.videos[index].name, self.gather([index])[0])
 
     def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
         return self.gather(draw(len(self), count, rng))
@@ -74,7 +73,7 @@ class DemoSet:
         batch = np.empty((len(indices), self.manifest.frames, size, size, 3), np.uint8)
         for place, index in enumerate(indices):
             shard, row = self._places[index]
-            batch[place] = self._shards[shard][row]
+            self._shards[shard].read(row, batch[place])
         return batch
 
     def split(self, held_out: int, seed: int = 0) -> tuple[VideoSubset, VideoSubset]:
@@ -104,12 +103,11 @@ class DemoSet:
         """
         with progress(f"verifying {self.manifest.name}", total=len(self)) as advance:
             first = 0
-            for shard, videos in zip(self.manifest.shards, self._shards, strict=True):
-                entries = self.manifest.videos[first : first + shard.videos]
+            for shard in self.manifest.shards:
                 damaged = [
-                    entry.name
-                    for entry, frames in zip(entries, videos, strict=True)
-                    if sha256_of_frames(frames) != entry.sha256
+                    self.manifest.videos[index].name
+                    for index in range(first, first + shard.videos)
+                    if sha256_of_frames(self[index].frames) != self.manifest.videos[index].sha256
                 ]
                 if damaged:
                     raise BootifolError(

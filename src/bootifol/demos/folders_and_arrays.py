@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -13,13 +12,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from bootifol.demos.shards import DAMAGED_ARRAY
 from bootifol.demos.upright import TimedFrame, upright_picture
 from bootifol.errors import BootifolError
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
-
-# What numpy raises on a damaged header, which it reads as a Python literal.
-_DAMAGED_ARRAY = (ValueError, OSError, EOFError, SyntaxError, tokenize.TokenError, MemoryError, TypeError)
 
 
 def stream_folder(path: Path) -> Iterator[TimedFrame]:
@@ -60,7 +57,7 @@ def stream_array(path: Path) -> Iterator[TimedFrame]:
     """Reads a .npy file, uint8 `[frames, H, W, 3]`; errors are `BootifolError`."""
     try:
         frames = np.load(path, mmap_mode="r", allow_pickle=False)
-    except _DAMAGED_ARRAY as error:
+    except DAMAGED_ARRAY as error:
         raise BootifolError(f"{path} is damaged or no numpy array: {error}") from error
     if frames.dtype != np.uint8 or frames.ndim != 4 or frames.shape[-1] != 3 or frames.size == 0:
         raise BootifolError(
@@ -86,7 +83,7 @@ def stream_archive(path: Path) -> Iterator[TimedFrame]:
                 f"width, 3], among {listed or 'nothing'}: save the one video alone"
             )
         frames = np.load(path, allow_pickle=False)[videos[0]]
-    except (*_DAMAGED_ARRAY, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+    except (*DAMAGED_ARRAY, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise BootifolError(f"{path} is damaged or no .npz archive: {error}") from error
     for frame in frames:
         yield TimedFrame(np.array(frame), None)

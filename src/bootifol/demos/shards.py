@@ -1,4 +1,4 @@
-"""The files of a demo set: uint8 arrays in numpy's own format, read through memory maps.
+"""The files of a demo set: uint8 arrays in numpy's own format, of which single videos are read.
 
     shard-00000.npy   header | video 0 | video 1 | … | video n-1        each video: frames, rows, columns, RGB
     shard-00001.npy   header | video n | …
@@ -10,7 +10,10 @@ from __future__ import annotations
 
 import hashlib
 import math
+import tokenize
+from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -19,8 +22,11 @@ from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.types import FrameBatch, Frames
 
-# Each open map holds one of the usual 1024 file descriptors, so a set has few shards; and a shard is what an
-# interrupted recording loses, so they are small.
+DAMAGED_ARRAY = (ValueError, OSError, EOFError, SyntaxError, tokenize.TokenError, MemoryError, TypeError)
+"""What numpy raises at a file that is no array of its own, or a damaged one: it reads headers as Python literals."""
+
+# Opening a set looks at every shard, so a set has few of them; and a shard is what an interrupted recording loses, so
+# they are small.
 _SHARD_BYTES = 16 * 2**20
 _MOST_SHARDS = 128
 
@@ -59,8 +65,42 @@ def write_shard(directory: Path, index: int, videos: FrameBatch) -> Shard:
         )
 
 
-def open_shard(directory: Path, shard: Shard, manifest: Manifest) -> FrameBatch:
-    """The shard as a read-only memory map `[n, T + 1, H, W, 3]`, after the checks that cost nothing.
+@dataclass(frozen=True)
+class OpenShard:
+    """A shard that was checked, ready to be read video by video.
+
+    Reading copies the bytes of one video and no more into this process. A memory map would do as well, but all that was
+    read through one counts as this process's memory until the system wants it back, and a file that is cut short
+    meanwhile kills the process instead of raising an error.
+    """
+
+    path: Path
+    videos: int
+    offset: int
+    """Bytes before the first video."""
+
+    def read(self, row: int, frames: Frames) -> None:
+        """Fills `frames`, uint8 `[T + 1, H, W, 3]` in one piece of memory, with video `row`.
+
+        Raises:
+            BootifolError: the file is gone, or shorter than it was.
+        """
+        try:
+            with self.path.open("rb") as file:
+                file.seek(self.offset + row * frames.nbytes)
+                complete = file.readinto(frames.data) == frames.nbytes
+        except OSError as error:
+            raise BootifolError(
+                f"{self.path} cannot be read any more: {error}; restore it and run the command again"
+            ) from error
+        if not complete:
+            raise BootifolError(
+                f"{self.path} has become shorter while it was in use: restore it or record the set again"
+            )
+
+
+def open_shard(directory: Path, shard: Shard, manifest: Manifest) -> OpenShard:
+    """Makes the checks of a shard that cost nothing; only its header is read.
 
     Raises:
         BootifolError: the file is missing, has another size than the manifest says, or another shape or type.
@@ -79,17 +119,34 @@ def open_shard(directory: Path, shard: Shard, manifest: Manifest) -> FrameBatch:
             "restore it or record the set again"
         )
     try:
-        videos = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
+        with path.open("rb") as file:
+            shape, dtype = _header(file)
+            offset = file.tell()
+    except DAMAGED_ARRAY as error:
         raise BootifolError(f"{path} is damaged: {error}; restore it or record the set again") from error
     expected = (shard.videos, manifest.frames, manifest.video_size, manifest.video_size, 3)
-    if not isinstance(videos, np.ndarray) or videos.shape != expected or videos.dtype != np.uint8:
-        found = f"{videos.dtype} {list(videos.shape)}" if isinstance(videos, np.ndarray) else "not an array"
+    if shape != expected or dtype != np.uint8:
         raise BootifolError(
-            f"{path} holds {found} where the manifest says uint8 {list(expected)}: "
+            f"{path} holds {dtype} {list(shape)} where the manifest says uint8 {list(expected)}: "
             "restore it or record the set again"
         )
-    return videos
+    if size != offset + math.prod(expected):
+        raise BootifolError(
+            f"{path} is damaged: {size - offset:,} bytes follow its header, which promises "
+            f"{math.prod(expected):,}; restore it or record the set again"
+        )
+    return OpenShard(path, shard.videos, offset)
+
+
+def _header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[np.generic]]:
+    """Shape and type of the array in a .npy file, whose data begins where this stops reading."""
+    version = np.lib.format.read_magic(file)
+    if version != (1, 0):
+        raise ValueError(f"its format is {version[0]}.{version[1]} where write_shard uses 1.0")
+    shape, by_columns, dtype = np.lib.format.read_array_header_1_0(file)
+    if by_columns:
+        raise ValueError("its first axis varies fastest, so that its videos do not lie one after another")
+    return shape, dtype
 
 
 def sha256_of_file(path: Path) -> str:

@@ -95,14 +95,7 @@ def ranking_scores(rows: Sequence[RankingRow]) -> RankingScores:
     Raises:
         BootifolError: a kind of `KINDS` has no video, or a reward is not finite.
     """
-    rewards = {kind: np.array([row.reward for row in rows if row.kind == kind]) for kind in KINDS}
-    for kind, of_kind in rewards.items():
-        if len(of_kind) == 0:
-            raise BootifolError(f"videos cannot be ranked: there is none of kind {kind}; add one at least")
-        if not np.isfinite(of_kind).all():
-            raise BootifolError(
-                f"videos cannot be ranked: a video of kind {kind} has a reward that is not finite"
-            )
+    rewards = _rewards_by_kind(rows)
     levels = np.concatenate([np.full(len(rewards[kind]), level) for level, kind in enumerate(KINDS)])
     values = np.concatenate([rewards[kind] for kind in KINDS])
     tau = float(stats.kendalltau(levels, values, variant="b").statistic)
@@ -116,6 +109,69 @@ def ranking_scores(rows: Sequence[RankingRow]) -> RankingScores:
         expert_margin=margin(rewards["expert"], rewards["half_good"]),
         half_good_margin=margin(rewards["half_good"], rewards["random"]),
     )
+
+
+Interval = tuple[float, float]
+"""Lower and upper end."""
+
+
+@dataclass(frozen=True)
+class RankingIntervals:
+    """How sure one can be of `RankingScores`, with so few videos; the rewards themselves are taken as they are."""
+
+    kendall_tau: Interval
+    expert_above_half_good: Interval
+    half_good_above_random: Interval
+    expert_above_random: Interval
+
+
+def ranking_intervals(
+    rows: Sequence[RankingRow], confidence: float = 0.95, resamples: int = 2000, seed: int = 0
+) -> RankingIntervals:
+    """Percentile bootstrap intervals over videos, drawn with replacement within each kind of `KINDS`.
+
+    The same rows give the same intervals: the resampling has its own generator, from `seed`.
+
+    Raises:
+        BootifolError: as `ranking_scores`.
+    """
+    rewards = _rewards_by_kind(rows)
+    rng = np.random.default_rng(seed)
+    drawn = []
+    for _ in range(resamples):
+        resampled = {kind: rng.choice(of_kind, len(of_kind)) for kind, of_kind in rewards.items()}
+        pairs = [area_under_curve(resampled[better], resampled[worse]) for better, worse in _PAIRS]
+        drawn.append([_tau_of_pairs(pairs, rewards), *pairs])
+    tail = (1.0 - confidence) / 2.0
+    low, high = np.quantile(np.array(drawn), [tail, 1.0 - tail], axis=0)
+    return RankingIntervals(*[(float(a), float(b)) for a, b in zip(low, high, strict=True)])
+
+
+_PAIRS = (("expert", "half_good"), ("half_good", "random"), ("expert", "random"))
+
+
+def _tau_of_pairs(pairs: Sequence[float], rewards: Mapping[str, NDArray[np.float64]]) -> float:
+    """Kendall's tau-b from the AUC of each of `_PAIRS`, where no two videos have one reward.
+
+    Of pairs of videos of two kinds the share AUC agrees with the order and the rest does not; pairs within a kind are
+    ties. Videos drawn twice by the bootstrap are no ties of the reward, so tau is not computed from them directly.
+    """
+    counts = np.array([len(rewards[better]) * len(rewards[worse]) for better, worse in _PAIRS])
+    videos = sum(len(of_kind) for of_kind in rewards.values())
+    agreeing_less_others = float(counts @ (2.0 * np.array(pairs) - 1.0))
+    return agreeing_less_others / float(np.sqrt(counts.sum() * (videos * (videos - 1) / 2)))
+
+
+def _rewards_by_kind(rows: Sequence[RankingRow]) -> dict[str, NDArray[np.float64]]:
+    rewards = {kind: np.array([row.reward for row in rows if row.kind == kind]) for kind in KINDS}
+    for kind, of_kind in rewards.items():
+        if len(of_kind) == 0:
+            raise BootifolError(f"videos cannot be ranked: there is none of kind {kind}; add one at least")
+        if not np.isfinite(of_kind).all():
+            raise BootifolError(
+                f"videos cannot be ranked: a video of kind {kind} has a reward that is not finite"
+            )
+    return rewards
 
 
 EXPERT_ABOVE_RANDOM = "ranking/expert_above_random"

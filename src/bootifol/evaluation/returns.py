@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
 
+from bootifol.envs.pictures import PictureConfig
+from bootifol.envs.pixels import PixelEnvironment
 from bootifol.envs.rollout import Act, play_episode
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow
+from bootifol.experts import Behavior, make_behavior
+from bootifol.tasks import Task, make_environment
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,38 @@ def evaluate(
         played = play_episode(environment, act, seed, f"{name}-{seed}")
         results.append(EpisodeResult(seed, played.environment_return, played.success))
     return results
+
+
+def unseen_environment(task: Task, episode_steps: int) -> PixelEnvironment:
+    """The task's environment for performers who look at the simulator's state: its pictures are black and cost nothing.
+
+    Args:
+        task: from the catalogue.
+        episode_steps: agent steps of an episode.
+    """
+    environment = make_environment(
+        task.name, PictureConfig(agent_size=8, video_size=8, stack=1), episode_steps
+    )
+    environment.rendered = False
+    return environment
+
+
+def behavior_results(
+    behavior: Behavior, task: Task, environment: PixelEnvironment, seeds: Iterable[int]
+) -> Iterator[EpisodeResult]:
+    """Plays one episode a seed with an expert, or whoever else records videos; the seed is the behavior's, too.
+
+    Args:
+        behavior: expert, half_good, random or still.
+        task: from the catalogue.
+        environment: the task's, from `unseen_environment` or `make_environment`.
+        seeds: one per episode.
+
+    Raises:
+        BootifolError: the task has no expert and the behavior wants one.
+    """
+    for seed in seeds:
+        yield from evaluate(environment, make_behavior(behavior, task.name, environment, seed), [seed])
 
 
 def scaled_return(

@@ -24,7 +24,8 @@ from bootifol.experts.policy import StatePolicy
 from bootifol.types import Action
 
 BUNDLED = Path(__file__).parent / "bundled"
-"""Where `<task>.safetensors` lies for every task whose expert was trained; beside it its curve and settings."""
+"""Where `<task>.safetensors` lies for every task whose expert was trained; beside it its curve and settings. Where
+there is a `<task>.half_trained.safetensors`, the same training stopped early, it is who plays `half_good`."""
 
 __all__ = ["Behavior", "make_behavior", "make_expert", "make_random"]
 
@@ -60,6 +61,10 @@ def make_behavior(behavior: Behavior, task_name: str, environment: gymnasium.Env
     if behavior == "still":
         return no_actions(_action_dim(environment))
     if behavior == "half_good":
+        half_trained = BUNDLED / f"{task_name}.half_trained.safetensors"
+        if half_trained.exists():
+            policy, simulator = StatePolicy.load(half_trained), _simulator(environment)
+            return lambda observation: policy(simulator.state())
         controller, wrong_goal = _script(task_name, environment)
         return HalfGood(controller, environment, seed, wrong_goal)
     raise BootifolError(
@@ -69,7 +74,7 @@ def make_behavior(behavior: Behavior, task_name: str, environment: gymnasium.Env
 
 def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Controller, WrongGoal | None]:
     """A task's scripted or bundled controller, and how to draw a wrong goal for it, if it can have another."""
-    simulator: Any = environment.unwrapped.simulator  # type: ignore[attr-defined]
+    simulator = _simulator(environment)
     bundled = BUNDLED / f"{task_name}.safetensors"
     if bundled.exists():
         policy = StatePolicy.load(bundled)
@@ -92,6 +97,10 @@ def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Contr
             task_name, simulator, rng
         )
     raise BootifolError(f"there is no expert for the task {task_name}; import videos of it instead")
+
+
+def _simulator(environment: gymnasium.Env[Any, Any]) -> Any:
+    return environment.unwrapped.simulator  # type: ignore[attr-defined]
 
 
 def _action_dim(environment: gymnasium.Env[Any, Any]) -> int:
