@@ -73,6 +73,18 @@ def test_training_goes_on_where_it_stopped(tmp_path: Path) -> None:
         train_expert(replace(CONFIG, seed=2), tmp_path / "run")
 
 
+@pytest.mark.usefixtures("short_episodes")
+def test_the_half_trained_policy_returned_about_half_of_the_best(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    returns = iter([10.0, 52.0, 100.0])
+    monkeypatch.setattr("bootifol.experts.train.evaluate_policy", lambda *_: [next(returns)])
+    train_expert(replace(CONFIG, agent_steps=90), tmp_path)
+    for name, steps in (("half_trained", 60), ("expert", 90)):
+        kept = (tmp_path / f"{name}.safetensors").read_bytes()
+        assert kept == (tmp_path / "policies" / f"{steps}.safetensors").read_bytes()
+
+
 def test_states_and_pictures_start_alike() -> None:
     states = StateEnvironment("reacher_hard", 20)
     first, _ = states.reset(seed=7)

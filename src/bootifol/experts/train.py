@@ -58,8 +58,9 @@ class ExpertConfig:
 def train_expert(config: ExpertConfig, out: Path) -> StatePolicy:
     """Trains an expert and keeps the best policy that an evaluation saw.
 
-    In `out`: `expert.safetensors` (the policy), `curve.csv` (an evaluation a row), `training.json` (configuration and
-    versions), `checkpoint/` (with which the same call goes on).
+    In `out`: `expert.safetensors` (the policy), `half_trained.safetensors` (the one whose return was nearest to half of
+    its), `curve.csv` (an evaluation a row), `training.json` (configuration and versions), `policies/` (the policy of
+    every evaluation), `checkpoint/` (with which the same call goes on).
 
     Raises:
         BootifolError: stable-baselines3 is missing, or `out` holds the training of another expert.
@@ -94,13 +95,25 @@ def train_expert(config: ExpertConfig, out: Path) -> StatePolicy:
                     "lowest_return": f"{np.min(returns):.2f}",
                 }
             )
-            if np.mean(returns) > best:
-                best = float(np.mean(returns))
-                policy.save(out / "expert.safetensors")
+            best = max(best, float(np.mean(returns)))
+            (out / "policies").mkdir(exist_ok=True)
+            policy.save(_policy_path(out, rows[-1]))
             _write_rows(out / "curve.csv", rows)
+            _keep_nearest(out, rows, best, "expert")
+            _keep_nearest(out, rows, 0.5 * best, "half_trained")
             _save_checkpoint(out / "checkpoint", model)
             advance(model.num_timesteps - done, mean_return=float(np.mean(returns)), best=best)
     return StatePolicy.load(out / "expert.safetensors")
+
+
+def _policy_path(out: Path, row: dict[str, str]) -> Path:
+    return out / "policies" / f"{row['agent_steps']}.safetensors"
+
+
+def _keep_nearest(out: Path, rows: list[dict[str, str]], mean_return: float, name: str) -> None:
+    """Keeps the policy of the evaluation with the mean return nearest to this one under a name."""
+    nearest = min(rows, key=lambda row: abs(float(row["mean_return"]) - mean_return))
+    StatePolicy.load(_policy_path(out, nearest)).save(out / f"{name}.safetensors")
 
 
 def evaluate_policy(policy: StatePolicy, environment: StateEnvironment, episodes: int) -> list[float]:
