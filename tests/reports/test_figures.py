@@ -61,6 +61,7 @@ def test_returns_have_a_panel_a_task_and_a_line_an_agent(tmp_path: Path) -> None
     assert points(reacher) == pytest.approx(np.array([(100.0, 7.5), (200.0, 30.0)]))
     assert points(reacher, 1) == pytest.approx(np.array([(100.0, 15.0), (200.0, 40.0)]))
     assert [line.get_label() for line in reacher.lines] == ["BootIfOL, 2 seeds", "ViRL, 1 seed"]
+    assert [text.get_text() for text in figure.legends[0].texts] == ["BootIfOL, 2 seeds", "ViRL, 1 seed"]
     assert hopper.lines[0].get_color() == reacher.lines[1].get_color()
     assert reacher.get_ylabel() == "return of 60-step episodes"
 

@@ -114,7 +114,7 @@ def test_markdown_shows_numbers_notes_and_the_dagger_of_a_single_seed(tmp_path: 
     lines = [[cell.strip() for cell in line.split("|")] for line in printed.splitlines()]
     assert ["", "Reacher Hard", "BootIfOL", "1", "2", *["0.50 [0.50, 0.50] †"] * 2, "0.99", ""] in lines
     assert ["", "", "ViRL", "–", "–", "–", "–", "0.00", ""] in lines
-    assert ["", "Reacher Hard", "Expert", "–", "–", "–", "–", "850.5 ± 315.7", ""] in lines
+    assert ["", "Reacher Hard", "Expert", "–", "–", "–", "–", "850.52 ± 315.70", ""] in lines
     assert f"- {tmp_path / 'cut'} (BootIfOL on Reacher Hard) is unfinished and left out" in printed
 
 

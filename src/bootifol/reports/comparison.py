@@ -134,6 +134,14 @@ def budget(run: RunFiles) -> str:
     return "an unknown budget" if steps is None else f"{steps:,} agent steps"
 
 
+def paths_of(runs: Sequence[RunFiles]) -> str:
+    """The directories of runs as a shell would expand them: `runs/{seed1,seed2}`."""
+    parents = {run.path.parent for run in runs}
+    if len(runs) == 1 or len(parents) > 1:
+        return ", ".join(str(run.path) for run in runs)
+    return str(parents.pop() / f"{{{','.join(run.path.name for run in runs)}}}")
+
+
 def _groups(runs: Sequence[RunFiles], agent: Callable[[RunFiles], str], notes: list[str]) -> list[Group]:
     found: dict[tuple[str, str], dict[frozenset[tuple[str, str]], dict[int | None, RunFiles]]] = {}
     for run in runs:
@@ -174,9 +182,7 @@ def _mixed(groups: Sequence[Group]) -> list[str]:
     for agent, variants in groupby(groups, key=lambda group: group.agent):
         mixed = list(variants)
         if len(mixed) > 1:
-            told = "; ".join(
-                f"({group.variant}) {', '.join(str(run.path) for run in group.runs)}" for group in mixed
-            )
+            told = "; ".join(f"({group.variant}) {paths_of(group.runs)}" for group in mixed)
             notes.append(
                 f"{agent} on {task_title(mixed[0].task)} is kept apart as {told}, since these differ in more than "
                 f"the seed: {_differences(mixed)}."

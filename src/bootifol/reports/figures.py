@@ -25,6 +25,7 @@ from bootifol.reports.style import (
     RUN_DASHES,
     agent_step_axis,
     house_style,
+    legend_above,
     step_axis,
 )
 
@@ -82,7 +83,8 @@ def returns_figure(comparison: Comparison, by_time: bool = False) -> Figure:
         BootifolError: there is no run, or one was not evaluated as the others of its task.
     """
     require_groups(comparison)
-    colors = {name: number for number, name in enumerate(dict.fromkeys(g.name for g in comparison.groups))}
+    labels = _labels(comparison.groups)
+    colors = {name: number for number, name in enumerate(labels)}
     panels = []
     for task in comparison.tasks():
         groups = comparison.of(task)
@@ -92,14 +94,14 @@ def returns_figure(comparison: Comparison, by_time: bool = False) -> Figure:
         figure, all_axes = _panels(len(panels))
         for axes, (task, length, bands) in zip(all_axes, panels, strict=True):
             for group, band in bands:
-                _draw(axes, band, colors[group.name], f"{group.name}, {_seeds(group)}", marked=True)
+                _draw(axes, band, colors[group.name], labels[group.name], marked=True)
             axes.set_title(task_title(task), loc="left", fontsize=9.5)
             axes.set_ylabel(f"return of {length}-step episodes")
             if by_time:
                 step_axis(axes, "minutes of wall-clock time")
             else:
                 agent_step_axis(axes)
-            _legend(axes)
+        legend_above(figure)
         _caption(figure, f"{CAPTION}; of a single seed over its episodes")
         return figure
 
@@ -151,10 +153,10 @@ def losses_figure(comparison: Comparison, phase: str, losses: Sequence[Loss]) ->
     panels = [[_losses(group, phase, loss) for group in comparison.groups] for loss in losses]
     with house_style():
         figure, all_axes = _panels(len(panels))
-        for number, (axes, loss, bands) in enumerate(zip(all_axes, losses, panels, strict=True)):
+        for axes, loss, bands in zip(all_axes, losses, panels, strict=True):
             for color, (group, band) in enumerate(zip(comparison.groups, bands, strict=True)):
                 task = f"{task_title(group.task)}, " if several else ""
-                _draw(axes, band, color, f"{task}{group.name}, {_seeds(group)}")
+                _draw(axes, band, color, f"{task}{_labels([group])[group.name]}")
             axes.set_title(loss.title, loc="left", fontsize=9.5)
             if axes.get_ylim()[0] > 0:
                 axes.set_ylim(bottom=0)
@@ -162,8 +164,7 @@ def losses_figure(comparison: Comparison, phase: str, losses: Sequence[Loss]) ->
                 agent_step_axis(axes)
             else:
                 step_axis(axes, "gradient steps")
-            if number == 0:
-                _legend(axes)
+        legend_above(figure)
         if any(len(group.runs) > 1 for group in comparison.groups):
             _caption(figure, CAPTION)
         return figure
@@ -258,15 +259,17 @@ def _draw(axes: Axes, band: Band, number: int, label: str, marked: bool = False)
     axes.plot(band.steps, band.mean, color=color, linestyle=dashes, marker=marker, markersize=3, label=label)
 
 
-def _legend(axes: Axes) -> None:
-    axes.legend(
-        loc="upper left", bbox_to_anchor=(-0.02, -0.17), ncols=2, borderaxespad=0.0, columnspacing=1.2
-    )
-
-
 def _caption(figure: Figure, text: str) -> None:
     figure.supxlabel(text, fontsize=8, color=FAINT, x=0.99, ha="right")
 
 
-def _seeds(group: Group) -> str:
-    return f"{len(group.runs)} seed{'s' if len(group.runs) > 1 else ''}"
+def _labels(groups: Sequence[Group]) -> dict[str, str]:
+    """Labels of the legend by name, such as `ViRL, 3 to 5 seeds` where that differs between tasks."""
+    counts: dict[str, list[int]] = {}
+    for group in groups:
+        counts.setdefault(group.name, []).append(len(group.runs))
+    labels = {}
+    for name, numbers in counts.items():
+        told = " to ".join(str(number) for number in dict.fromkeys((min(numbers), max(numbers))))
+        labels[name] = f"{name}, {told} seed{'' if told == '1' else 's'}"
+    return labels

@@ -23,6 +23,7 @@ from bootifol.reports.style import (
     RUN_DASHES,
     agent_step_axis,
     house_style,
+    legend_above,
     step_axis,
 )
 
@@ -285,20 +286,8 @@ def _metric_figure(looks: Sequence[RunLook], panels: Sequence[tuple[str, str]], 
 
 def _legend(figure: Figure, looks: Sequence[RunLook]) -> None:
     """A legend above the plots, where several runs are compared."""
-    if len(looks) == 1:
-        return
-    lines: dict[str, Any] = {}
-    for axes in figure.axes:
-        for line, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            lines.setdefault(label, line)
-    figure.legend(
-        list(lines.values()),
-        list(lines),
-        loc="outside upper left",
-        ncols=3,
-        handlelength=2.4,
-        columnspacing=1.2,
-    )
+    if len(looks) > 1:
+        legend_above(figure)
 
 
 def _is_drawable(curve: Curve | None) -> bool:

@@ -99,6 +99,24 @@ def save_png(figure: Figure, out: Path) -> Path:
     return out
 
 
+def legend_above(figure: Figure) -> None:
+    """One legend above all plots, every label once, in as many columns as its labels leave room for."""
+    lines: dict[str, Any] = {}
+    for axes in figure.axes:
+        for line, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            lines.setdefault(label, line)
+    # A label wants about 0.55 inches for its line and 0.07 a letter.
+    inches = 0.55 + 0.07 * max(len(label) for label in lines)
+    figure.legend(
+        list(lines.values()),
+        list(lines),
+        loc="outside upper left",
+        ncols=max(1, int(figure.get_figwidth() / inches)),
+        handlelength=2.4,
+        columnspacing=1.2,
+    )
+
+
 def agent_step_axis(axes: Axes) -> None:
     """A horizontal axis of agent steps."""
     step_axis(axes, "agent steps")

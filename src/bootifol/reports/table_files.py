@@ -144,7 +144,8 @@ def _paper(row: ResultRow, measure: Measure) -> str:
         return NOTHING
     if row.paper.scaled is not None and measure == "scaled":
         return _number(row.paper.scaled, measure)
-    return f"{_number(row.paper.absolute, measure)} ± {_number(row.paper.deviation, measure)}"
+    # With the digits that the paper prints.
+    return f"{row.paper.absolute:.2f} ± {row.paper.deviation:.2f}"
 
 
 def _count(number: int) -> str:
