@@ -16,12 +16,16 @@ from matplotlib.figure import Figure
 from benchmarks.figure_command import figure_parser, write_figure
 from bootifol.reports.comparison import compare
 from bootifol.reports.figures import returns_figure
+from bootifol.reports.names import LEARN_NOTHING
 from bootifol.reports.run_files import RunFiles
 
 
 def draw(runs: list[RunFiles], arguments: argparse.Namespace) -> tuple[Figure, Sequence[str]]:
-    comparison = compare(runs)
-    return returns_figure(comparison, arguments.by_time), comparison.notes
+    comparison = compare([run for run in runs if run.method not in LEARN_NOTHING])
+    left_out = [
+        f"{run.path} learns nothing, so it has no curve." for run in runs if run.method in LEARN_NOTHING
+    ]
+    return returns_figure(comparison, arguments.by_time), [*comparison.notes, *left_out]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

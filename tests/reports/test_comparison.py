@@ -116,6 +116,14 @@ def test_equal_terms_need_no_note(tmp_path: Path) -> None:
     assert not comparison_of(tmp_path).notes
 
 
+def test_a_random_policy_has_no_budget_to_spend_or_to_compare(tmp_path: Path) -> None:
+    write_run(tmp_path / "a", method="random", agent_steps=0)
+    write_run(tmp_path / "b", time_budget=60.0, seconds=61.0)
+    comparison = comparison_of(tmp_path)
+    assert [group.name for group in comparison.groups] == ["Random", "BootIfOL"]
+    assert not comparison.notes
+
+
 @pytest.mark.parametrize(
     ("method", "changes", "name"),
     [

@@ -151,6 +151,15 @@ def test_a_figure_is_written_whole(
     assert [path.name for path in out.parent.iterdir()] == ["returns.png"]
 
 
+def test_a_random_policy_has_no_curve(
+    ablations: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    random = write_run(tmp_path / "random", method="random", agent_steps=0)
+    arguments = [str(random), str(ablations / "all"), "--out", str(tmp_path / "figure.png")]
+    assert figure_returns.main(arguments) == 0
+    assert f"{random} learns nothing, so it has no curve" in capsys.readouterr().out
+
+
 def test_an_ablation_wants_two_variants_of_bootifol(
     ablations: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -60,6 +60,19 @@ def test_the_paper_stands_beside_and_what_was_not_run_is_shown(tmp_path: Path) -
     assert (absolute["Expert"].level, absolute["Random"].level) == (pytest.approx(100.0), pytest.approx(0.0))
 
 
+def test_a_random_policy_that_was_played_has_the_last_row(tmp_path: Path) -> None:
+    write_run(tmp_path / "a", (1.0, 3.0), method="random", agent_steps=0)
+    write_run(tmp_path / "b")
+    results = results_of(tmp_path)
+    row = list(rows_of(results, "absolute").values())[-1]
+    assert row.agent == "Random"
+    assert row.summary is not None
+    assert row.summary.mean == pytest.approx(2.0)
+    assert row.paper is not None
+    assert row.paper.absolute == 6.64
+    assert list(rows_of(results, "scaled"))[-1] == "Random"
+
+
 def test_each_suite_has_the_papers_table_and_other_tasks_their_own(tmp_path: Path) -> None:
     for task in ("drawn_home", "drawer_close", "reacher_hard"):
         write_run(tmp_path / task, task=task)

@@ -12,7 +12,7 @@ from itertools import groupby
 
 from bootifol.progress import duration
 from bootifol.reports.final_return import final_return
-from bootifol.reports.names import METHOD_NAMES, agent_name, task_title
+from bootifol.reports.names import LEARN_NOTHING, METHOD_NAMES, agent_name, task_title
 from bootifol.reports.run_files import RunFiles, flattened
 
 IRRELEVANT = {"checkpoint_minutes", "tensorboard"}
@@ -97,14 +97,15 @@ def compare(
 
 def unfinished_because(run: RunFiles) -> str | None:
     """Why a run's numbers are not those of its end; None for a finished run."""
+    learns = run.method not in LEARN_NOTHING
     wanted = _count_of(run, "evaluation.final_episodes")
     steps = _count_of(run, "interactive.agent_steps")
     if wanted is None or steps is None:
         return "its config.json does not say how long it trains and in how many episodes it is evaluated then"
-    if run.time_budget is None and run.agent_steps < steps:
+    if learns and run.time_budget is None and run.agent_steps < steps:
         return f"it has trained for {run.agent_steps:,} of {steps:,} agent steps"
     seconds = run.seconds or 0.0
-    if run.time_budget is not None and seconds < run.time_budget:
+    if learns and run.time_budget is not None and seconds < run.time_budget:
         return f"it has trained for {duration(seconds)} of {duration(run.time_budget)}"
     final = final_return(run)
     if final is None or final.agent_steps < run.agent_steps:
@@ -128,6 +129,8 @@ def terms(run: RunFiles) -> dict[str, str]:
 
 def budget(run: RunFiles) -> str:
     """What a run may spend, in words."""
+    if run.method in LEARN_NOTHING:
+        return "none"
     if run.time_budget is not None:
         return duration(run.time_budget)
     steps = _count_of(run, "interactive.agent_steps")
@@ -191,17 +194,18 @@ def _mixed(groups: Sequence[Group]) -> list[str]:
 
 
 def _unequal(groups: Sequence[Group], compared: Collection[str]) -> list[str]:
-    """What is not the same for all agents of a task: budgets, then anything else but what is compared."""
-    if len(groups) < 2:
+    """What is not the same for all agents of a task that learn: budgets, then anything else but what is compared."""
+    learners = [group for group in groups if group.runs[0].method not in LEARN_NOTHING]
+    if len(learners) < 2:
         return []
-    task, notes = task_title(groups[0].task), []
-    budgets = {group.name: budget(group.runs[0]) for group in groups}
+    task, notes = task_title(learners[0].task), []
+    budgets = {group.name: budget(group.runs[0]) for group in learners}
     if len(set(budgets.values())) > 1:
         told = "; ".join(f"{name}: {spent}" for name, spent in budgets.items())
         notes.append(
             f"Budgets on {task} are unequal ({told}), so these numbers do not compare methods alone."
         )
-    firsts = list({group.agent: group for group in groups}.values())
+    firsts = list({group.agent: group for group in learners}.values())
     others = _differences(firsts, {*compared, *BUDGET}, ignored_sections=("reward.",))
     if others:
         notes.append(f"Also unequal between agents on {task}: {others}.")

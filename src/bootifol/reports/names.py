@@ -16,6 +16,9 @@ METHOD_NAMES = {
 }
 """The paper's names of the methods; `environment`, which it does not have, learns from the true reward."""
 
+LEARN_NOTHING = {"random", "expert"}
+"""Ends of the scale, which are played but not trained: they have final episodes, no budget and no curve."""
+
 
 def task_title(task: str) -> str:
     """Reacher Hard of reacher_hard; names with a colon are other people's and stay as they are."""

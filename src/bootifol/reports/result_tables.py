@@ -10,7 +10,7 @@ from bootifol.errors import BootifolError
 from bootifol.evaluation.summary import Summary, summarize
 from bootifol.reports.comparison import Comparison, Group, budget, compare, paths_of
 from bootifol.reports.final_return import FinalReturn, final_return
-from bootifol.reports.names import task_title
+from bootifol.reports.names import LEARN_NOTHING, task_title
 from bootifol.reports.paper_results import REMARKS, TABLES, PaperReturn
 from bootifol.reports.run_files import RunFiles
 
@@ -193,9 +193,9 @@ def _provenance(comparison: Comparison) -> list[str]:
     for group in comparison.groups:
         steps = sorted({run.agent_steps for run in group.runs})
         presets = ", ".join(dict.fromkeys(run.preset for run in group.runs))
-        trained = " to ".join(f"{count:,}" for count in dict.fromkeys((steps[0], steps[-1])))
-        notes.append(
-            f"{group.name} on {task_title(group.task)}: {group.seeds} ({paths_of(group.runs)}), preset {presets}, "
-            f"budget {budget(group.runs[0])}, trained for {trained} agent steps."
-        )
+        told = f"{group.name} on {task_title(group.task)}: {group.seeds} ({paths_of(group.runs)}), preset {presets}"
+        if group.runs[0].method not in LEARN_NOTHING:
+            trained = " to ".join(f"{count:,}" for count in dict.fromkeys((steps[0], steps[-1])))
+            told += f", budget {budget(group.runs[0])}, trained for {trained} agent steps"
+        notes.append(f"{told}.")
     return notes
