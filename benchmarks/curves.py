@@ -11,8 +11,9 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from bootifol.files import written_aside
-from bootifol.reports.plots import draw_return_curves, house_style, looks_of
+from bootifol.reports.plots import draw_return_curves, looks_of
 from bootifol.reports.run_files import read_run
+from bootifol.reports.style import house_style
 
 
 def main() -> None:

@@ -31,7 +31,7 @@ from bootifol.evaluation.ranking import draw_references
 from bootifol.experts import make_expert
 from bootifol.files import written_aside
 from bootifol.progress import progress
-from bootifol.reports.plots import house_style
+from bootifol.reports.style import house_style
 from bootifol.training.components import build_environment
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run

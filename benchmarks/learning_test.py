@@ -29,7 +29,7 @@ from bootifol.evaluation.tables import read_evaluations
 from bootifol.experts import make_random
 from bootifol.files import written_aside
 from bootifol.presets import preset
-from bootifol.reports.plots import KIND_COLORS, RUN_COLORS, RUN_DASHES, house_style
+from bootifol.reports.style import KIND_COLORS, RUN_COLORS, RUN_DASHES, house_style
 from bootifol.rewards.registry import RewardConfig
 from bootifol.tasks import Task, task_named
 from bootifol.training.components import build_environment

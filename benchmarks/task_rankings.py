@@ -44,7 +44,7 @@ from bootifol.files import written_aside
 from bootifol.memory import keep_freed_memory
 from bootifol.presets import preset
 from bootifol.progress import progress
-from bootifol.reports.plots import KIND_COLORS, KIND_NAMES, house_style
+from bootifol.reports.style import KIND_COLORS, KIND_NAMES, house_style
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.tasks import TASKS, Task
 from bootifol.types import Video

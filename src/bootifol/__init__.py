@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from bootifol.demos.record import record_demos as record_demos
     from bootifol.errors import BootifolError as BootifolError
     from bootifol.reports.html import report as report
+    from bootifol.reports.table_files import table as table
     from bootifol.training.api import continue_run as resume
     from bootifol.training.api import evaluate_run as evaluate
     from bootifol.training.api import score_videos as score
@@ -36,6 +37,7 @@ _WHERE = {
     "record_demos": ("bootifol.demos.record", "record_demos"),
     "BootifolError": ("bootifol.errors", "BootifolError"),
     "report": ("bootifol.reports.html", "report"),
+    "table": ("bootifol.reports.table_files", "table"),
     "resume": ("bootifol.training.api", "continue_run"),
     "evaluate": ("bootifol.training.api", "evaluate_run"),
     "score": ("bootifol.training.api", "score_videos"),
@@ -52,6 +54,7 @@ __all__ = [
     "report",
     "resume",
     "score",
+    "table",
     "train",
 ]
 

@@ -32,3 +32,11 @@ def test_the_interval_repeats_and_needs_two_values() -> None:
     assert summarize([3.0]).interval is None
     with pytest.raises(BootifolError, match="no episode"):
         summarize([])
+
+
+def test_one_lucky_episode_widens_the_interval_of_the_mean_only() -> None:
+    summary = summarize([0.0] * 15 + [160.0])
+    assert summary.interval is not None
+    assert summary.interquartile_interval == (0.0, 0.0)
+    assert summary.interval[1] > 20.0
+    assert summarize([3.0]).interquartile_interval is None

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 from synthetic_run import AGENT_STEPS, write_synthetic_run
 
-from bootifol.reports.findings import final_return, findings, number
+from bootifol.reports.final_return import final_return
+from bootifol.reports.findings import findings, number
 from bootifol.reports.run_files import read_run
 
 

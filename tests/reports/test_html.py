@@ -8,7 +8,8 @@ from synthetic_run import write_synthetic_run
 
 from bootifol.cli.report import report as report_command
 from bootifol.errors import BootifolError
-from bootifol.reports.html import duration, flattened, report
+from bootifol.reports.html import duration, report
+from bootifol.reports.run_files import flattened
 
 
 class Page(HTMLParser):

@@ -9,6 +9,7 @@ from bootifol.errors import BootifolError
 from bootifol.reports import plots
 from bootifol.reports.film_strip import reward_above_film_strip, save_readme_picture, videos_of_start
 from bootifol.reports.run_files import Curve, RunFiles, read_run
+from bootifol.reports.style import KIND_COLORS, svg_data_uri, thousands
 
 
 @pytest.fixture(scope="module")
@@ -71,9 +72,9 @@ def test_long_curves_are_binned(run: RunFiles) -> None:
 def test_kinds_have_one_color_everywhere(run: RunFiles) -> None:
     figure = plots.ranking_plot(run.ranking_moments()[0])
     strip = reward_above_film_strip(videos_of_start(run, 0))
-    assert figure.axes[0].lines[0].get_color() == plots.KIND_COLORS["random"]
+    assert figure.axes[0].lines[0].get_color() == KIND_COLORS["random"]
     colors = {line.get_label(): line.get_color() for line in strip.axes[0].lines}
-    assert colors == {kind: plots.KIND_COLORS[kind] for kind in ("expert", "agent", "random")}
+    assert colors == {kind: KIND_COLORS[kind] for kind in ("expert", "agent", "random")}
 
 
 def test_pictures_stand_at_their_time(run: RunFiles) -> None:
@@ -93,7 +94,7 @@ def test_the_same_figure_gives_the_same_bytes(run: RunFiles) -> None:
     first, second = (plots.return_curves(looks, scaled=True) for _ in range(2))
     assert first is not None
     assert second is not None
-    assert plots.svg_data_uri(first) == plots.svg_data_uri(second)
+    assert svg_data_uri(first) == svg_data_uri(second)
 
 
 def test_the_picture_for_the_readme(shared_run: Path, tmp_path: Path) -> None:
@@ -112,4 +113,4 @@ def test_a_run_without_showcase_has_no_picture(run_dir: Path, tmp_path: Path) ->
 
 @pytest.mark.parametrize(("value", "text"), [(950, "950"), (12_000, "12K"), (1_550_000, "1.55M"), (0, "0")])
 def test_counts_are_short(value: float, text: str) -> None:
-    assert plots.thousands(value) == text
+    assert thousands(value) == text

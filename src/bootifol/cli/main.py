@@ -70,6 +70,7 @@ def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
     from bootifol.cli.evaluate import evaluate
     from bootifol.cli.report import report
     from bootifol.cli.score import score
+    from bootifol.cli.table import table
     from bootifol.cli.tasks import tasks
     from bootifol.cli.train import preset_of, train
 
@@ -81,6 +82,7 @@ def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
         "evaluate": evaluate,
         "score": score,
         "report": report,
+        "table": table,
         "experts": _experts_placeholder,
     }
 

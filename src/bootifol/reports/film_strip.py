@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,15 +13,10 @@ from matplotlib.figure import Figure, SubFigure
 
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
-from bootifol.reports.plots import (
-    FAINT,
-    KIND_COLORS,
-    KIND_NAMES,
-    draw_return_curves,
-    house_style,
-    looks_of,
-)
+from bootifol.reports.names import agent_name, task_title
+from bootifol.reports.plots import draw_return_curves, looks_of
 from bootifol.reports.run_files import RunFiles, ShowcaseVideo, read_run
+from bootifol.reports.style import FAINT, KIND_COLORS, KIND_NAMES, house_style
 
 KINDS = ("expert", "agent", "random")
 """Whose pictures are shown, from top to bottom."""
@@ -50,6 +45,54 @@ def reward_above_film_strip(videos: Mapping[str, ShowcaseVideo]) -> Figure:
         layout = _Layout.of(videos, curve_height=1.9)
         figure = Figure(figsize=(WIDTH, layout.height))
         draw_reward_and_strips(figure, videos, layout)
+        return figure
+
+
+def expert_above_agent(runs: Sequence[RunFiles], start: int = 0) -> Figure:
+    """Film strips of expert and agent from the same start, one pair a run, from the first picture to the last.
+
+    Args:
+        runs: from `read_run`, with a showcase.
+        start: which of the showcase's starts, from 0.
+
+    Raises:
+        BootifolError: a run has no such start, or no expert.
+    """
+    pairs = []
+    for run in runs:
+        videos = {k: v for k, v in videos_of_start(run, start).items() if k in ("expert", "agent")}
+        if len(videos) < 2:
+            missing = " and ".join(kind for kind in ("expert", "agent") if kind not in videos)
+            raise BootifolError(
+                f"{run.path} has no film of {missing} from start {start} (it has the starts "
+                f"{', '.join(map(str, run.starts())) or 'none'}): a finished run of a task with an expert has them in "
+                "showcase.safetensors"
+            )
+        pairs.append((run, videos))
+    with house_style():
+        layouts = [_Layout.of(videos, curve_height=0.0, top=0.3) for _, videos in pairs]
+        height = sum(layout.height for layout in layouts)
+        figure = Figure(figsize=(WIDTH, height), dpi=150)
+        top = height
+        for (run, videos), layout in zip(pairs, layouts, strict=True):
+            top -= layout.height
+            steps = max(len(video.rewards) for video in videos.values())
+            moments = [round(number * steps / (PICTURES - 1)) for number in range(PICTURES)]
+            for row, (kind, video) in enumerate(videos.items(), start=1):
+                left, bottom, width, share = layout.box(row)
+                box = (left, (top + bottom * layout.height) / height, width, share * layout.height / height)
+                axes = figure.add_axes(box)
+                draw_strip(axes, kind, video, steps, moments)
+                if row == 1:
+                    axes.set_title(f"{task_title(run.task)}: {agent_name(run)}", loc="left", fontsize=9.5)
+                    axes.set_xticks([])
+                else:
+                    middles = [
+                        (number + 0.5 * PICTURE_SHARE) * steps / PICTURES for number in range(PICTURES)
+                    ]
+                    axes.set_xticks(middles, [str(moment) for moment in moments])
+                    axes.set_xlabel("agent steps since the start")
+                    axes.tick_params(axis="x", labelbottom=True)
         return figure
 
 
@@ -89,9 +132,11 @@ def draw_reward_and_strips(
     steps = max(len(video.rewards) for video in videos.values())
     curves = figure.add_axes(layout.box(0))
     _draw_rewards(curves, videos, steps)
+    # Each picture shows the moment at the middle of the time it covers.
+    moments = [int((number + 0.5) * steps / PICTURES) for number in range(PICTURES)]
     for row, (kind, video) in enumerate(videos.items(), start=1):
         strip = figure.add_axes(layout.box(row), sharex=curves)
-        _draw_strip(strip, kind, video, steps)
+        draw_strip(strip, kind, video, steps, moments)
         if row == len(videos):
             strip.set_xlabel("agent steps in the episode")
             strip.tick_params(axis="x", labelbottom=True, length=3)
@@ -142,11 +187,10 @@ def _draw_rewards(axes: Axes, videos: Mapping[str, ShowcaseVideo], steps: int) -
     axes.legend(loc="best", ncols=len(videos))
 
 
-def _draw_strip(axes: Axes, kind: str, video: ShowcaseVideo, steps: int) -> None:
-    """Pictures side by side; each shows the moment at the middle of the time it covers."""
-    width = steps / PICTURES
-    for number in range(PICTURES):
-        moment = int((number + 0.5) * width)
+def draw_strip(axes: Axes, kind: str, video: ShowcaseVideo, steps: int, moments: Sequence[int]) -> None:
+    """Pictures side by side over an axis of agent steps, one a moment; those past the video's end stay empty."""
+    width = steps / len(moments)
+    for number, moment in enumerate(moments):
         if moment < len(video.frames):
             left = number * width
             extent = (left, left + PICTURE_SHARE * width, 0.0, 1.0)

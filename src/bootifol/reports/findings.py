@@ -10,8 +10,8 @@ import numpy as np
 
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import RankingScores, ranking_scores
-from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import RankingRow
+from bootifol.reports.final_return import FinalReturn, final_return
 from bootifol.reports.run_files import CLONING, INTERACTIVE, Curve, RunFiles
 
 Verdict = Literal["good", "fair", "poor"]
@@ -24,43 +24,11 @@ def number(value: float) -> str:
 
 
 @dataclass(frozen=True)
-class FinalReturn:
-    """The evaluation that speaks for a run: the latest on the longest episodes, scaled ones first."""
-
-    agent_steps: int
-    episode_steps: int
-    environment_return: Summary
-    scaled_return: Summary | None
-    successes: int | None
-    """Episodes that solved the task, where it says so."""
-
-
-@dataclass(frozen=True)
 class Finding:
     """One sentence and how good its news are."""
 
     verdict: Verdict
     text: str
-
-
-def final_return(run: RunFiles) -> FinalReturn | None:
-    """The evaluation that speaks for a run; None where there is none."""
-    lengths = run.episode_lengths(scaled=True) or run.episode_lengths()
-    if not lengths:
-        return None
-    grouped = run.evaluations_of(lengths[-1])
-    if not grouped:
-        return None
-    agent_steps, rows = list(grouped.items())[-1]
-    scaled = [row.scaled_return for row in rows if row.scaled_return is not None]
-    successes = [row.success for row in rows if row.success is not None]
-    return FinalReturn(
-        agent_steps=agent_steps,
-        episode_steps=lengths[-1],
-        environment_return=summarize([row.environment_return for row in rows]),
-        scaled_return=summarize(scaled) if scaled else None,
-        successes=sum(successes) if successes else None,
-    )
 
 
 def scores_or_none(rows: Sequence[RankingRow]) -> RankingScores | None:

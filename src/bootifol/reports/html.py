@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import base64
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
@@ -17,10 +16,12 @@ from bootifol.evaluation.summary import Summary
 from bootifol.files import written_aside
 from bootifol.reports import plots
 from bootifol.reports.film_strip import KINDS, reward_above_film_strip, videos_of_start
-from bootifol.reports.findings import FinalReturn, Finding, final_return, findings, number, scores_or_none
-from bootifol.reports.plots import KIND_COLORS, RunLook, looks_of, svg_data_uri, thousands
-from bootifol.reports.run_files import COUNTERS, RunFiles, read_run
-from bootifol.tasks import short_name
+from bootifol.reports.final_return import FinalReturn, final_return
+from bootifol.reports.findings import Finding, findings, number, scores_or_none
+from bootifol.reports.names import task_title
+from bootifol.reports.plots import RunLook, looks_of
+from bootifol.reports.run_files import COUNTERS, RunFiles, flattened, read_run
+from bootifol.reports.style import KIND_COLORS, svg_data_uri, thousands
 
 SHOWN_STARTS = 4
 """Starts shown with pictures and videos; more would make the file heavy and tell little."""
@@ -186,12 +187,7 @@ def _template_environment() -> Environment:
 
 
 def _title(runs: Sequence[RunFiles]) -> str:
-    return ", ".join(dict.fromkeys(_task_title(run.task) for run in runs))
-
-
-def _task_title(task: str) -> str:
-    """Reacher Hard of reacher_hard; names with a colon are other people's and stay as they are."""
-    return short_name(task) if ":" in task else task.replace("_", " ").title()
+    return ", ".join(dict.fromkeys(task_title(run.task) for run in runs))
 
 
 def _section(look: RunLook, anchor: str, alone: bool) -> RunSection:
@@ -355,15 +351,6 @@ def _video_rows(run: RunFiles) -> list[list[PlayedVideo]]:
             )
         rows.append(row)
     return [row for row in rows if row]
-
-
-def flattened(config: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """The fields of a nested configuration as rows of dotted name and value."""
-    for name, value in config.items():
-        if isinstance(value, Mapping):
-            yield from flattened(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", str(value)
 
 
 def duration(seconds: float) -> str:

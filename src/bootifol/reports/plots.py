@@ -1,70 +1,31 @@
-"""The plots of a report: one look, one color per kind.
-
-The palette (from Okabe and Ito's) can be told apart with any color vision: expert dark blue, half-good light
-blue, agent vermilion, random gray.
-"""
+"""The plots of a report."""
 
 from __future__ import annotations
 
-import base64
-import io
-import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
 from numpy.typing import NDArray
 
 from bootifol.evaluation.summary import summarize
 from bootifol.evaluation.tables import EvaluationRow, RankingRow
 from bootifol.reports.run_files import ALIGNMENT, INTERACTIVE, Curve, RunFiles
-
-KIND_COLORS = {"expert": "#0B5394", "half_good": "#56B4E9", "agent": "#D55E00", "random": "#7A7F87"}
-KIND_NAMES = {"expert": "expert", "half_good": "half-good", "agent": "agent", "random": "random"}
-RUN_COLORS = ("#D55E00", "#009E73", "#AA4499", "#E69F00", "#332288", "#661100")
-RUN_DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
-INK, FAINT, GRID = "#30363D", "#8B929B", "#E7EAEE"
-
-HALF_WIDTH = (5.1, 3.0)
-"""Size in inches of a figure that fills half of the page, or all of a phone."""
-
-# Any, since matplotlib's versions disagree on the type of the keys.
-STYLE: Any = {
-    "font.size": 9.0,
-    "axes.labelsize": 9.0,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": "#C4C9D0",
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.grid.axis": "y",
-    "axes.axisbelow": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.8,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
-    "xtick.major.size": 3.0,
-    "ytick.major.size": 0.0,
-    "lines.linewidth": 1.7,
-    "lines.solid_capstyle": "round",
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "text.color": INK,
-    "figure.facecolor": "white",
-    "svg.fonttype": "none",
-    "svg.hashsalt": "bootifol",
-}
+from bootifol.reports.style import (
+    FAINT,
+    HALF_WIDTH,
+    KIND_COLORS,
+    KIND_NAMES,
+    RUN_COLORS,
+    RUN_DASHES,
+    agent_step_axis,
+    house_style,
+    legend_above,
+    step_axis,
+)
 
 
 @dataclass(frozen=True)
@@ -100,26 +61,6 @@ def looks_of(runs: Sequence[RunFiles]) -> list[RunLook]:
             )
         )
     return looks
-
-
-@contextmanager
-def house_style() -> Iterator[None]:
-    """Figures made inside have the report's look; matplotlib's global settings are left alone."""
-    with mpl.rc_context(STYLE):
-        yield
-
-
-def svg_data_uri(figure: Figure) -> str:
-    """The figure as an SVG data URI. Text stays text, in the reader's own sans-serif font."""
-    buffer = io.BytesIO()
-    with house_style():
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    text = re.sub(
-        r"(font: [^';\"]*?)'[^;\"]*",
-        r"\1system-ui, 'Segoe UI', Roboto, Arial, sans-serif",
-        buffer.getvalue().decode(),
-    )
-    return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode("ascii")
 
 
 def return_curves(looks: Sequence[RunLook], scaled: bool, by_time: bool = False) -> Figure | None:
@@ -173,9 +114,9 @@ def draw_return_curves(axes: Axes, looks: Sequence[RunLook], scaled: bool, by_ti
         _draw_levels(axes, *levels)
     axes.set_ylabel("scaled return" if scaled else "return of an episode")
     if by_time:
-        _step_axis(axes, "minutes of wall-clock time")
+        step_axis(axes, "minutes of wall-clock time")
     else:
-        _agent_step_axis(axes)
+        agent_step_axis(axes)
     return True
 
 
@@ -336,29 +277,17 @@ def _metric_figure(looks: Sequence[RunLook], panels: Sequence[tuple[str, str]], 
             if name.startswith("loss/") and axes.get_ylim()[0] > 0:
                 axes.set_ylim(bottom=0)
             if phase == INTERACTIVE:
-                _agent_step_axis(axes)
+                agent_step_axis(axes)
             else:
-                _step_axis(axes, "gradient steps")
+                step_axis(axes, "gradient steps")
         _legend(figure, looks)
         return figure
 
 
 def _legend(figure: Figure, looks: Sequence[RunLook]) -> None:
     """A legend above the plots, where several runs are compared."""
-    if len(looks) == 1:
-        return
-    lines: dict[str, Any] = {}
-    for axes in figure.axes:
-        for line, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            lines.setdefault(label, line)
-    figure.legend(
-        list(lines.values()),
-        list(lines),
-        loc="outside upper left",
-        ncols=3,
-        handlelength=2.4,
-        columnspacing=1.2,
-    )
+    if len(looks) > 1:
+        legend_above(figure)
 
 
 def _is_drawable(curve: Curve | None) -> bool:
@@ -367,41 +296,23 @@ def _is_drawable(curve: Curve | None) -> bool:
 
 def _draw_binned(axes: Axes, curve: Curve, look: RunLook, alone: bool) -> None:
     """The mean of about 100 bins as a line; with one run, the range of each bin's middle 80 % behind it."""
-    steps = _binned(curve, curve.steps, np.mean)
+    steps = binned(curve, curve.steps, np.mean)
     axes.plot(
         steps,
-        _binned(curve, curve.values, np.mean),
+        binned(curve, curve.values, np.mean),
         color=look.color,
         linestyle=look.dashes,
         label=look.label,
     )
     if alone:
-        low = _binned(curve, curve.values, lambda values: np.quantile(values, 0.1))
-        high = _binned(curve, curve.values, lambda values: np.quantile(values, 0.9))
+        low = binned(curve, curve.values, lambda values: np.quantile(values, 0.1))
+        high = binned(curve, curve.values, lambda values: np.quantile(values, 0.9))
         axes.fill_between(steps, low, high, color=look.color, alpha=0.16, linewidth=0)
 
 
-def _binned(
+def binned(
     curve: Curve, values: NDArray[np.float64], reduce: Callable[[NDArray[np.float64]], Any], bins: int = 100
 ) -> NDArray[np.float64]:
+    """The values in about equal parts, each reduced to a number; at most `bins` of them."""
     parts = np.array_split(values, min(bins, len(curve)))
     return np.array([float(reduce(part)) for part in parts])
-
-
-def _agent_step_axis(axes: Axes) -> None:
-    _step_axis(axes, "agent steps")
-
-
-def _step_axis(axes: Axes, label: str) -> None:
-    axes.set_xlabel(label)
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10], integer=True))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: thousands(value)))
-    axes.margins(x=0.02)
-
-
-def thousands(value: float) -> str:
-    """A count, short: 950, 12K, 1.55M."""
-    for size, letter in ((1_000_000, "M"), (1_000, "K")):
-        if abs(value) >= size:
-            return f"{value / size:.2f}".rstrip("0").rstrip(".") + letter
-    return f"{value:g}"

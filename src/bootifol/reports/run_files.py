@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,6 +69,9 @@ class RunFiles:
     preset: str
     seed: int | None
     demos: str
+    time_budget: float | None
+    """Seconds of wall-clock time it was given for learning; None where agent steps end it."""
+
     command: str
     config: Mapping[str, Any]
     versions: Mapping[str, str]
@@ -149,6 +152,44 @@ class RunFiles:
         return grouped
 
 
+def find_runs(paths: Sequence[Path]) -> list[Path]:
+    """The run directories among the paths and below them, each once, in the order given.
+
+    What lies inside a run is passed over, so that a shell may expand `runs/**`.
+
+    Raises:
+        BootifolError: there are no paths, or one leads to no run.
+    """
+    if not paths:
+        raise BootifolError("there is no run; name the directory of one at least, or one that holds several")
+    found: dict[Path, Path] = {}
+    for path in paths:
+        if not path.exists():
+            raise BootifolError(
+                f"there is no directory {path}; give directories that `train` wrote, or one that holds them"
+            )
+        below = _runs_below(path)
+        if not below and not any(_is_run(parent) for parent in path.resolve().parents):
+            raise BootifolError(
+                f"there is no run in {path}; give directories that `train` wrote, or one that holds them"
+            )
+        for run_dir in below:
+            found.setdefault(run_dir.resolve(), run_dir)
+    return list(found.values())
+
+
+def _runs_below(path: Path) -> list[Path]:
+    if _is_run(path):
+        return [path]
+    if not path.is_dir():
+        return []
+    return [run_dir for child in sorted(path.iterdir()) if child.is_dir() for run_dir in _runs_below(child)]
+
+
+def _is_run(path: Path) -> bool:
+    return (path / "config.json").is_file()
+
+
 def read_run(run_dir: Path) -> RunFiles:
     """Reads a run directory.
 
@@ -170,7 +211,7 @@ def read_run(run_dir: Path) -> RunFiles:
     showcase = _read_showcase(run_dir / "showcase.safetensors", notes)
     video_files = _find_videos(run_dir / "videos", notes)
     seconds = [*metric_seconds, *(row.seconds for row in evaluations)]
-    seed = header.get("seed")
+    seed, time_budget = header.get("seed"), header.get("time_budget")
     return RunFiles(
         path=run_dir,
         task=header["task"],
@@ -178,6 +219,7 @@ def read_run(run_dir: Path) -> RunFiles:
         preset=str(header.get("preset", "unknown preset")),
         seed=seed if isinstance(seed, int) else None,
         demos=_as_text(header.get("demos", "")),
+        time_budget=float(time_budget) if isinstance(time_budget, int | float) else None,
         command=_as_text(header.get("command", "")),
         config=_as_mapping(header.get("config"), "config", notes),
         versions={k: str(v) for k, v in _as_mapping(header.get("versions"), "versions", notes).items()},
@@ -189,6 +231,15 @@ def read_run(run_dir: Path) -> RunFiles:
         video_files=video_files,
         notes=notes,
     )
+
+
+def flattened(config: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """The fields of a nested configuration as rows of dotted name and value."""
+    for name, value in config.items():
+        if isinstance(value, Mapping):
+            yield from flattened(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", str(value)
 
 
 def _scaled(row: EvaluationRow) -> float:

@@ -1,0 +1,48 @@
+"""What the commands of the paper's figures share: runs in, one PNG out, a sentence where something is missing."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from bootifol.errors import BootifolError
+from bootifol.reports.run_files import RunFiles, find_runs, read_run
+from bootifol.reports.style import save_png
+
+Draw = Callable[[list[RunFiles], argparse.Namespace], tuple[Figure, Sequence[str]]]
+"""From runs and arguments to a figure and what must be said about it."""
+
+
+def figure_parser(description: str | None) -> argparse.ArgumentParser:
+    """The arguments of every figure: runs and `--out`."""
+    parser = argparse.ArgumentParser(
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "runs", type=Path, nargs="+", help="directories that `bootifol train` wrote, or that hold some"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="a PNG file")
+    return parser
+
+
+def write_figure(parser: argparse.ArgumentParser, draw: Draw, arguments: Sequence[str] | None = None) -> int:
+    """Reads the runs, draws, writes; prints what must be said about the figure.
+
+    Returns:
+        The exit code: 0, or 2 after bad input, which one sentence explains.
+    """
+    parsed = parser.parse_args(arguments)
+    try:
+        figure, notes = draw([read_run(run_dir) for run_dir in find_runs(parsed.runs)], parsed)
+        save_png(figure, parsed.out)
+    except BootifolError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    for note in notes:
+        print(f"- {note}")
+    print(f"figure: {parsed.out}")
+    return 0

@@ -1,0 +1,26 @@
+"""`bootifol table`: the paper's result tables from runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+def table(runs: Annotated[list[Path], tyro.conf.Positional], out: Path | None = None) -> int:
+    """Print the paper's result tables, scaled and absolute, with the returns of your runs beside the paper's.
+
+    Runs that differ in their seed alone share a row. Below the tables stands what was left out (unfinished runs,
+    copies) and what is not on equal terms (mixed configurations or versions, unequal budgets).
+
+    Args:
+        runs: Directories that `bootifol train` wrote, or directories that hold some.
+        out: A file to write besides; its ending says how: .md (Markdown), .tex (LaTeX) or .csv.
+    """
+    from bootifol.reports.table_files import table as write_table
+
+    print(write_table(runs, out), end="")
+    if out is not None:
+        print(f"\ntable: {out}")
+    return 0

@@ -1,0 +1,232 @@
+"""Which runs may be averaged, and what else must be said before their numbers stand beside each other.
+
+Runs are averaged where they differ in their seed alone. Everything that would make an average or a comparison
+unfair is told in a sentence: unfinished runs, seeds given twice, mixed configurations or versions, unequal terms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from bootifol.progress import duration
+from bootifol.reports.final_return import final_return
+from bootifol.reports.names import LEARN_NOTHING, METHOD_NAMES, agent_name, task_title
+from bootifol.reports.run_files import RunFiles, flattened
+
+IRRELEVANT = {"checkpoint_minutes", "tensorboard"}
+"""Fields of a configuration that change no number of a run."""
+
+BUDGET = ("time_budget", "interactive.agent_steps")
+
+SHOWN_DIFFERENCES = 6
+"""Fields named in one sentence; the rest are counted."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Runs of one agent on one task that differ in their seed alone."""
+
+    task: str
+    agent: str
+    variant: str
+    """A letter where an agent has several groups on a task, else empty."""
+
+    runs: tuple[RunFiles, ...]
+    """In the order of their seeds."""
+
+    @property
+    def name(self) -> str:
+        """The agent and its variant."""
+        return f"{self.agent} ({self.variant})" if self.variant else self.agent
+
+    @property
+    def seeds(self) -> str:
+        """Such as `seeds 1, 2`."""
+        return f"seed{'s' if len(self.runs) > 1 else ''} {', '.join(str(run.seed) for run in self.runs)}"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Groups of runs, and what must be said about them."""
+
+    groups: Sequence[Group]
+    notes: Sequence[str]
+    """One sentence each."""
+
+    def tasks(self) -> list[str]:
+        """The tasks, in the order of their first run."""
+        return list(dict.fromkeys(group.task for group in self.groups))
+
+    def of(self, task: str) -> list[Group]:
+        """The groups of a task."""
+        return [group for group in self.groups if group.task == task]
+
+
+def compare(
+    runs: Sequence[RunFiles],
+    agent: Callable[[RunFiles], str] = agent_name,
+    compared: Collection[str] = (),
+    unfinished: bool = False,
+) -> Comparison:
+    """Sorts runs into groups that may be averaged.
+
+    Args:
+        runs: from `read_run`.
+        agent: what a run is compared as, such as its method or the value of an ablated field.
+        compared: names of configuration fields that are meant to differ between agents, such as
+            `alignment.gradient_steps`; those of the reward methods always are.
+        unfinished: whether runs that have not come to their end count too; they are named in any case.
+    """
+    notes: list[str] = []
+    kept = []
+    for run in runs:
+        reason = unfinished_because(run)
+        if reason is None or unfinished:
+            kept.append(run)
+        if reason is not None:
+            fate = "unfinished and counts as far as it has come" if unfinished else "unfinished and left out"
+            notes.append(f"{run.path} ({agent(run)} on {task_title(run.task)}) is {fate}: {reason}.")
+    groups = _groups(kept, agent, notes)
+    for task in dict.fromkeys(group.task for group in groups):
+        notes += _mixed([group for group in groups if group.task == task])
+        notes += _unequal([group for group in groups if group.task == task], compared)
+    return Comparison(groups, notes)
+
+
+def unfinished_because(run: RunFiles) -> str | None:
+    """Why a run's numbers are not those of its end; None for a finished run."""
+    learns = run.method not in LEARN_NOTHING
+    wanted = _count_of(run, "evaluation.final_episodes")
+    steps = _count_of(run, "interactive.agent_steps")
+    if wanted is None or steps is None:
+        return "its config.json does not say how long it trains and in how many episodes it is evaluated then"
+    if learns and run.time_budget is None and run.agent_steps < steps:
+        return f"it has trained for {run.agent_steps:,} of {steps:,} agent steps"
+    seconds = run.seconds or 0.0
+    if learns and run.time_budget is not None and seconds < run.time_budget:
+        return f"it has trained for {duration(seconds)} of {duration(run.time_budget)}"
+    final = final_return(run)
+    if final is None or final.agent_steps < run.agent_steps:
+        return "its final evaluation is missing"
+    if final.environment_return.count < wanted:
+        return f"its final evaluation has {final.environment_return.count} of {wanted} episodes"
+    return None
+
+
+def terms(run: RunFiles) -> dict[str, str]:
+    """Everything but the seed that a run's numbers depend on, by name; without the sections of other methods."""
+    others = tuple(f"reward.{method}." for method in METHOD_NAMES if method != run.method)
+    config = {
+        name: value
+        for name, value in flattened(run.config)
+        if name not in IRRELEVANT and not name.startswith(others)
+    }
+    versions = {f"versions.{name}": value for name, value in run.versions.items()}
+    return {"time_budget": str(run.time_budget), "demos": run.demos, **config, **versions}
+
+
+def budget(run: RunFiles) -> str:
+    """What a run may spend, in words."""
+    if run.method in LEARN_NOTHING:
+        return "none"
+    if run.time_budget is not None:
+        return duration(run.time_budget)
+    steps = _count_of(run, "interactive.agent_steps")
+    return "an unknown budget" if steps is None else f"{steps:,} agent steps"
+
+
+def paths_of(runs: Sequence[RunFiles]) -> str:
+    """The directories of runs as a shell would expand them: `runs/{seed1,seed2}`."""
+    parents = {run.path.parent for run in runs}
+    if len(runs) == 1 or len(parents) > 1:
+        return ", ".join(str(run.path) for run in runs)
+    return str(parents.pop() / f"{{{','.join(run.path.name for run in runs)}}}")
+
+
+def _groups(runs: Sequence[RunFiles], agent: Callable[[RunFiles], str], notes: list[str]) -> list[Group]:
+    found: dict[tuple[str, str], dict[frozenset[tuple[str, str]], dict[int | None, RunFiles]]] = {}
+    for run in runs:
+        variants = found.setdefault((run.task, agent(run)), {})
+        seeds = variants.setdefault(frozenset(terms(run).items()), {})
+        if run.seed in seeds:
+            same = seeds[run.seed].evaluations == run.evaluations
+            notes.append(
+                f"{run.path} is left out: it {'is a copy' if same else 'has the seed and the configuration'} of "
+                f"{seeds[run.seed].path}."
+            )
+        else:
+            seeds[run.seed] = run
+    return [
+        Group(
+            task,
+            name,
+            _letter(number) if len(variants) > 1 else "",
+            tuple(sorted(seeds.values(), key=lambda run: run.seed or 0)),
+        )
+        for (task, name), variants in found.items()
+        for number, seeds in enumerate(variants.values())
+    ]
+
+
+def _letter(number: int) -> str:
+    """a, b, … z, aa, ab, …"""
+    letters = ""
+    while number >= 0:
+        letters = chr(ord("a") + number % 26) + letters
+        number = number // 26 - 1
+    return letters
+
+
+def _mixed(groups: Sequence[Group]) -> list[str]:
+    """One sentence for every agent whose runs cannot be averaged."""
+    notes = []
+    for agent, variants in groupby(groups, key=lambda group: group.agent):
+        mixed = list(variants)
+        if len(mixed) > 1:
+            told = "; ".join(f"({group.variant}) {paths_of(group.runs)}" for group in mixed)
+            notes.append(
+                f"{agent} on {task_title(mixed[0].task)} is kept apart as {told}, since these differ in more than "
+                f"the seed: {_differences(mixed)}."
+            )
+    return notes
+
+
+def _unequal(groups: Sequence[Group], compared: Collection[str]) -> list[str]:
+    """What is not the same for all agents of a task that learn: budgets, then anything else but what is compared."""
+    learners = [group for group in groups if group.runs[0].method not in LEARN_NOTHING]
+    if len(learners) < 2:
+        return []
+    task, notes = task_title(learners[0].task), []
+    budgets = {group.name: budget(group.runs[0]) for group in learners}
+    if len(set(budgets.values())) > 1:
+        told = "; ".join(f"{name}: {spent}" for name, spent in budgets.items())
+        notes.append(
+            f"Budgets on {task} are unequal ({told}), so these numbers do not compare methods alone."
+        )
+    firsts = list({group.agent: group for group in learners}.values())
+    others = _differences(firsts, {*compared, *BUDGET}, ignored_sections=("reward.",))
+    if others:
+        notes.append(f"Also unequal between agents on {task}: {others}.")
+    return notes
+
+
+def _differences(
+    groups: Sequence[Group], ignored: Collection[str] = (), ignored_sections: tuple[str, ...] = ()
+) -> str:
+    """The fields in which groups differ, with their values in the order of the groups; empty where they do not."""
+    all_terms = [terms(group.runs[0]) for group in groups]
+    names = dict.fromkeys(name for each in all_terms for name in each)
+    told = []
+    for name in names:
+        values = [each.get(name, "absent") for each in all_terms]
+        if len(set(values)) > 1 and name not in ignored and not name.startswith(ignored_sections):
+            told.append(f"{name} ({' / '.join(values)})")
+    more = len(told) - SHOWN_DIFFERENCES
+    return ", ".join(told[:SHOWN_DIFFERENCES]) + (f" and {more} more" if more > 0 else "")
+
+
+def _count_of(run: RunFiles, name: str) -> int | None:
+    value = dict(flattened(run.config)).get(name, "")
+    return int(value) if value.isdecimal() else None

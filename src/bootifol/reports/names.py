@@ -1,0 +1,42 @@
+"""What tasks and agents are called in tables and figures."""
+
+from __future__ import annotations
+
+from bootifol.reports.run_files import RunFiles, flattened
+from bootifol.tasks import short_name
+
+METHOD_NAMES = {
+    "bootifol": "BootIfOL",
+    "virl": "ViRL",
+    "context_translation": "CT",
+    "gaifo": "GAIfO",
+    "environment": "True reward",
+    "random": "Random",
+    "expert": "Expert",
+}
+"""The paper's names of the methods; `environment`, which it does not have, learns from the true reward."""
+
+LEARN_NOTHING = {"random", "expert"}
+"""Ends of the scale, which are played but not trained: they have final episodes, no budget and no curve."""
+
+
+def task_title(task: str) -> str:
+    """Reacher Hard of reacher_hard; names with a colon are other people's and stay as they are."""
+    return short_name(task) if ":" in task else task.replace("_", " ").title()
+
+
+def agent_name(run: RunFiles) -> str:
+    """The paper's name of what a run trained, such as `CT (n=10)`; any other method's own name."""
+    config = dict(flattened(run.config))
+    name = METHOD_NAMES.get(run.method, run.method)
+    if run.method == "context_translation":
+        return f"{name} (n={config.get('reward.context_translation.references', '?')})"
+    if run.method == "bootifol":
+        backbone = config.get("reward.bootifol.backbone", "None")
+        if "efficientnet" in backbone:
+            name = f"Eff-{name}"
+        elif backbone not in ("", "None", "none"):
+            name = f"{name} ({backbone})"
+        if config.get("reward.bootifol.reward") == "cosine":
+            name = f"{name} (cosine)"
+    return name

@@ -1,0 +1,204 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_up_runs import write_run
+from matplotlib.axes import Axes
+from PIL import Image
+
+from benchmarks import (
+    figure_alignment,
+    figure_alignment_losses,
+    figure_demonstrations,
+    figure_encoder_training,
+    figure_encoding_based,
+    figure_returns,
+    figure_sequence_loss,
+    table_dm_control,
+    table_meta_world,
+)
+from bootifol.errors import BootifolError
+from bootifol.reports.comparison import Comparison, compare
+from bootifol.reports.figures import Loss, losses_figure, over_seeds, returns_figure
+from bootifol.reports.film_strip import expert_above_agent
+from bootifol.reports.run_files import Curve, find_runs, read_run
+
+CURVE = {100: [10.0, 20.0], 200: [30.0, 50.0]}
+
+
+def comparison_of(root: Path) -> Comparison:
+    return compare([read_run(run_dir) for run_dir in find_runs([root])])
+
+
+def points(axes: Axes, line: int = 0) -> np.ndarray:
+    return np.asarray(axes.lines[line].get_xydata())
+
+
+def test_seeds_are_averaged_where_all_are_known() -> None:
+    early = Curve(np.array([0.0, 100.0, 200.0]), np.array([0.0, 10.0, 20.0]))
+    late = Curve(np.array([50.0, 150.0]), np.array([1.0, 3.0]))
+    band = over_seeds([early, late])
+    assert band.steps.tolist() == [50.0, 100.0, 150.0]
+    # The first is 5, 10 and 15 there, the second 1, 2 and 3.
+    assert band.mean == pytest.approx([3.0, 6.0, 9.0])
+    assert band.low == pytest.approx([1.0, 2.0, 3.0])
+    assert band.high == pytest.approx([5.0, 10.0, 15.0])
+
+
+def test_seeds_without_a_common_moment_are_refused() -> None:
+    one, two = (Curve(np.array([step]), np.array([1.0])) for step in (1.0, 2.0))
+    with pytest.raises(BootifolError, match="no moment in common"):
+        over_seeds([one, two])
+
+
+def test_returns_have_a_panel_a_task_and_a_line_an_agent(tmp_path: Path) -> None:
+    write_run(tmp_path / "a", seed=1, curve=CURVE)
+    write_run(tmp_path / "b", seed=2, curve={100: [0.0, 0.0], 200: [20.0, 20.0]})
+    write_run(tmp_path / "c", method="virl", curve=CURVE)
+    write_run(tmp_path / "d", method="virl", task="hopper_stand", curve=CURVE)
+    figure = returns_figure(comparison_of(tmp_path))
+    reacher, hopper = figure.axes
+    assert points(reacher) == pytest.approx(np.array([(100.0, 7.5), (200.0, 30.0)]))
+    assert points(reacher, 1) == pytest.approx(np.array([(100.0, 15.0), (200.0, 40.0)]))
+    assert [line.get_label() for line in reacher.lines] == ["BootIfOL, 2 seeds", "ViRL, 1 seed"]
+    assert [text.get_text() for text in figure.legends[0].texts] == ["BootIfOL, 2 seeds", "ViRL, 1 seed"]
+    assert hopper.lines[0].get_color() == reacher.lines[1].get_color()
+    assert reacher.get_ylabel() == "return of 60-step episodes"
+
+
+def test_returns_over_time_stand_at_their_minutes(tmp_path: Path) -> None:
+    write_run(tmp_path / "a", seconds=600.0, curve=CURVE)
+    axes = returns_figure(comparison_of(tmp_path), by_time=True).axes[0]
+    assert points(axes)[:, 0] == pytest.approx([1.0, 2.0])
+
+
+def test_episodes_of_different_lengths_are_not_drawn_together(tmp_path: Path) -> None:
+    write_run(tmp_path / "a", curve=CURVE)
+    write_run(tmp_path / "b", method="virl")
+    with pytest.raises(BootifolError, match="episodes differ in length"):
+        returns_figure(comparison_of(tmp_path))
+
+
+def test_a_loss_may_be_the_sum_of_two(tmp_path: Path) -> None:
+    write_run(tmp_path / "a", seed=1, losses={"prediction": [4.0, 3.0], "sequence": [2.0, 1.0]})
+    write_run(tmp_path / "b", seed=2, losses={"prediction": [2.0, 1.0], "sequence": [2.0, 1.0]})
+    loss = Loss("L_seq", ("loss/prediction", "loss/sequence"))
+    axes = losses_figure(comparison_of(tmp_path), "alignment", [loss]).axes[0]
+    assert points(axes) == pytest.approx(np.array([(10.0, 5.0), (20.0, 3.0)]))
+
+
+def test_a_run_without_the_loss_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run_dir = write_run(tmp_path / "a", method="gaifo", losses={"discriminator": [1.0, 1.0]})
+    assert figure_sequence_loss.main([str(run_dir), "--out", str(tmp_path / "figure.png")]) == 2
+    told = capsys.readouterr().err
+    assert f"{run_dir} has logged no loss/prediction in its Interactive Phase" in told
+    assert not (tmp_path / "figure.png").exists()
+
+
+LOSSES = {name: [4.0, 3.0, 2.0] for name in ("prediction", "sequence", "autoencoder", "triplet")}
+
+
+@pytest.fixture
+def ablations(tmp_path: Path) -> Path:
+    """Runs that differ in what the paper ablates."""
+    write_run(tmp_path / "runs" / "all", curve=CURVE, losses=LOSSES)
+    write_run(tmp_path / "runs" / "no-alignment", curve=CURVE, alignment__gradient_steps=0)
+    write_run(
+        tmp_path / "runs" / "to-the-end",
+        curve=CURVE,
+        alignment__gradient_steps=0,
+        interactive__reward_updates_until=1000,
+    )
+    write_run(tmp_path / "runs" / "encodings", curve=CURVE, agent__observations="encodings")
+    return tmp_path / "runs"
+
+
+@pytest.mark.parametrize(
+    ("command", "runs", "labels"),
+    [
+        (
+            figure_alignment,
+            ["all", "no-alignment", "to-the-end"],
+            ["alignment", "no-alignment", "no-alignment, trained to the end"],
+        ),
+        (figure_encoder_training, ["to-the-end", "no-alignment"], ["500-step", "1K-step"]),
+        (figure_encoding_based, ["all", "encodings"], ["image-based", "encoding-based"]),
+        (figure_returns, ["all"], ["BootIfOL"]),
+        (figure_alignment_losses, ["all"], ["BootIfOL"]),
+        (figure_sequence_loss, ["all"], ["BootIfOL"]),
+    ],
+)
+def test_every_figure_is_a_command(
+    command: object, runs: list[str], labels: list[str], ablations: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn = []
+    monkeypatch.setattr("benchmarks.figure_command.save_png", lambda figure, out: drawn.append(figure))
+    arguments = [*(str(ablations / run) for run in runs), "--out", "figure.png"]
+    assert command.main(arguments) == 0  # type: ignore[attr-defined]
+    assert [line.get_label() for line in drawn[0].axes[0].lines] == [f"{label}, 1 seed" for label in labels]
+
+
+def test_a_figure_is_written_whole(
+    ablations: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "docs" / "returns.png"
+    assert figure_returns.main([str(ablations / "all"), "--out", str(out)]) == 0
+    assert f"figure: {out}" in capsys.readouterr().out
+    with Image.open(out) as picture:
+        assert len(picture.convert("RGB").getcolors(maxcolors=1 << 22)) > 10
+    assert figure_returns.main([str(ablations / "all"), "--out", str(out.with_suffix(".bmp"))]) == 2
+    assert "ends in .png" in capsys.readouterr().err
+    assert [path.name for path in out.parent.iterdir()] == ["returns.png"]
+
+
+def test_a_random_policy_has_no_curve(
+    ablations: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    random = write_run(tmp_path / "random", method="random", agent_steps=0)
+    arguments = [str(random), str(ablations / "all"), "--out", str(tmp_path / "figure.png")]
+    assert figure_returns.main(arguments) == 0
+    assert f"{random} learns nothing, so it has no curve" in capsys.readouterr().out
+
+
+def test_an_ablation_wants_two_variants_of_bootifol(
+    ablations: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one = [str(ablations / "all"), "--out", "figure.png"]
+    assert figure_alignment.main(one) == 2
+    assert "all finished runs are of one variant, alignment: add one" in capsys.readouterr().err
+    write_run(ablations / "cut", agent_steps=10, alignment__gradient_steps=0)
+    assert figure_alignment.main([str(ablations / "cut"), *one]) == 2
+    assert "cut (no-alignment on Reacher Hard) is unfinished" in capsys.readouterr().err
+    other = write_run(ablations / "other", method="virl")
+    assert figure_alignment.main([str(other), *one]) == 2
+    assert "is of the method virl, but the ablation is of bootifol" in capsys.readouterr().err
+
+
+def test_film_strips_begin_at_the_start_and_end_at_the_end(shared_run: Path) -> None:
+    run = read_run(shared_run)
+    figure = expert_above_agent([run, run], start=1)
+    assert len(figure.axes) == 4
+    for axes, kind in zip(figure.axes, ["expert", "agent"] * 2, strict=True):
+        frames = run.showcase[kind, 1].frames
+        assert np.array_equal(np.asarray(axes.images[0].get_array()), frames[0])
+        assert np.array_equal(np.asarray(axes.images[-1].get_array()), frames[60])
+    assert [text.get_text() for text in figure.axes[1].get_xticklabels()][:2] == ["0", "7"]
+    tops = [axes.get_position().y1 for axes in figure.axes]
+    assert tops == sorted(tops, reverse=True)
+
+
+def test_a_run_without_films_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run_dir = write_run(tmp_path / "a")
+    assert figure_demonstrations.main([str(run_dir), "--out", str(tmp_path / "figure.png")]) == 2
+    assert f"{run_dir} has no film of expert and agent from start 0" in capsys.readouterr().err
+
+
+def test_the_papers_tables_are_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_run(tmp_path / "a")
+    write_run(tmp_path / "b", task="drawn_home")
+    assert table_dm_control.main([str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "Table 5 of the paper" in printed
+    assert "Drawn Home" not in printed
+    assert table_meta_world.main([str(tmp_path)]) == 2
+    assert "none of the runs is on button_press, plate_slide, drawer_close" in capsys.readouterr().err
