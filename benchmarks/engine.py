@@ -203,7 +203,8 @@ def floor(stage: Stage, rates: Rates) -> float | None:
         stage.ours()
     # Read: parameter, gradient, both averages; written: parameter and averages; 4 bytes each.
     moved = stage.pixels + 7 * 4 * stage.parameters
-    return 1e3 * (counter.get_total_flops() / rates.arithmetic + moved / rates.copy)
+    seconds: float = counter.get_total_flops() / rates.arithmetic + moved / rates.copy
+    return 1e3 * seconds
 
 
 def medians(ours: Work, plain: Work, runs: int, warm_up: int) -> tuple[float, float]:
