@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bootifol.errors import BootifolError
+from bootifol.networks.backbones import Backbone, load_backbone
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
@@ -41,6 +42,24 @@ class RewardConfig:
 
     gaifo: GaifoConfig = field(default_factory=GaifoConfig)
     """GAIfO's discriminator."""
+
+
+def make_backbone(method: str, config: RewardConfig, video_size: int, device: str = "cpu") -> Backbone | None:
+    """The frozen network whose features a method reads instead of pixels; None where it reads pixels.
+
+    Args:
+        method: a key of METHODS.
+        config: of all methods.
+        video_size: side of the videos in pixels.
+        device: where to compute, as PyTorch names it.
+
+    Raises:
+        BootifolError: the backbone cannot be loaded, or cannot read videos of that size.
+    """
+    own = config.bootifol
+    if method != "bootifol" or own.backbone is None:
+        return None
+    return load_backbone(own.backbone, video_size, own.precision, device)
 
 
 def make_reward_model(

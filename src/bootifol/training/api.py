@@ -56,7 +56,7 @@ def train_policy(
         demos: directory of the videos.
         out: directory of the run, new or empty.
         method: bootifol, virl, context_translation, gaifo, or environment for the upper bound.
-        preset: paper, cpu, demo, drawn or smoke.
+        preset: paper, cpu, demo, drawn, smoke or backbone.
         seed: of everything random.
         time_budget: seconds of wall-clock time for learning; None for the configuration's agent steps.
         config: instead of the preset's.

@@ -15,13 +15,15 @@ from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.demos.check import differences
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.features import FeaturizedVideos, without_pixels
 from bootifol.demos.manifest import read_manifest
 from bootifol.demos.record import record
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import KINDS
+from bootifol.networks.backbones import Backbone
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
-from bootifol.rewards.registry import make_reward_model
+from bootifol.rewards.registry import make_backbone, make_reward_model
 from bootifol.tasks import make_environment
 from bootifol.training.checkpoint import Stateful
 from bootifol.training.demonstrations import Demonstrations
@@ -48,6 +50,8 @@ class Components:
     """The parts of a run that learn or remember."""
 
     reward_model: RewardModel
+    backbone: Backbone | None
+    """Frozen, and so no part of a checkpoint; None where the reward model reads pixels."""
     agent: DrQv2
     replay: ReplayBuffer
     agent_videos: AgentVideos
@@ -72,6 +76,11 @@ def build_environment(run: RunConfig, episode_steps: int) -> gymnasium.Env[Any, 
 def build_reward_model(run: RunConfig) -> RewardModel:
     """The method's reward model, untrained."""
     return make_reward_model(run.method, run.training.reward, run.training.pictures.video_size, run.seed)
+
+
+def build_backbone(run: RunConfig) -> Backbone | None:
+    """The frozen network whose features the reward model reads; None where it reads pixels."""
+    return make_backbone(run.method, run.training.reward, run.training.pictures.video_size)
 
 
 def build_agent(run: RunConfig, environment: gymnasium.Env[Any, Any]) -> DrQv2:
@@ -121,11 +130,18 @@ def build_components(
     action_dim = environment.action_space.shape[0]
     frames = run.resolved_task().episode_steps + 1
     reward_model = build_reward_model(run)
+    backbone = build_backbone(run)
+    ring = (
+        config.interactive.agent_videos,
+        frames,
+        pictures.video_size,
+        backbone.feature_size if backbone else 0,
+    )
     # The upper bound has no demonstrations: it learns from true rewards, which videos do not tell.
     demonstrated = 0 if reward_model.reads_environment_reward else demonstrated_videos(run, expert)
     size = pictures.agent_size
     replay_bytes = ReplayBuffer.bytes_needed(config.agent.replay_capacity, size, action_dim)
-    video_bytes = AgentVideos.bytes_needed(config.interactive.agent_videos, frames, pictures.video_size)
+    video_bytes = AgentVideos.bytes_needed(*ring)
     parts = [
         f"replay {replay_bytes / 1e9:.2f} GB ({config.agent.replay_capacity:,} frames)",
         f"the agent's videos {video_bytes / 1e9:.2f} GB ({config.interactive.agent_videos:,} episodes)",
@@ -136,6 +152,7 @@ def build_components(
     console.print(f"memory when full: {', '.join(parts)}")
     return Components(
         reward_model=reward_model,
+        backbone=backbone,
         agent=build_agent(run, environment),
         replay=ReplayBuffer(
             config.agent.replay_capacity,
@@ -146,7 +163,7 @@ def build_components(
             config.agent.discount,
             config.agent.shift,
         ),
-        agent_videos=AgentVideos(config.interactive.agent_videos, frames, pictures.video_size),
+        agent_videos=AgentVideos(*ring),
         demonstrations=build_demonstrations(run, expert, action_dim) if demonstrated else None,
     )
 
@@ -186,6 +203,7 @@ def open_demos(run: RunConfig, console: Console) -> Demos:
             episode_steps=expert.manifest.frames - 1,
             action_repeat=run.training.action_repeat,
         )
+    backbone = build_backbone(run)
     held_out = min(run.training.evaluation.held_out_videos, len(expert) // 5)
     sources: dict[str, VideoSource] = {}
     kept: dict[str, list[Video]] = {}
@@ -194,8 +212,15 @@ def open_demos(run: RunConfig, console: Console) -> Demos:
             continue
         demo_set = expert if kind == "expert" else _open(paths[kind], run)
         training, aside = demo_set.split(min(held_out, len(demo_set) - 1))
-        sources[kind] = training
-        kept[kind] = [aside[index] for index in range(len(aside))]
+        if backbone is None:
+            sources[kind] = training
+            kept[kind] = [aside[index] for index in range(len(aside))]
+            continue
+        sources[kind] = featurized = FeaturizedVideos(training, backbone)
+        if kind in ("expert", "random"):
+            featurized.compute()
+        featurized_aside = FeaturizedVideos(aside, backbone)
+        kept[kind] = without_pixels(featurized_aside[index] for index in range(len(aside)))
     return Demos(sources["expert"], sources["random"], kept if held_out else {})
 
 
