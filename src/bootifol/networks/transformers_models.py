@@ -75,8 +75,8 @@ def load_transformers_model(name: str) -> tuple[PooledOutput, Normalization]:
     except Exception as error:
         raise BootifolError(
             f"the backbone {name} cannot be loaded ({_first_line(error)}); name a vision model of the Hugging Face hub "
-            "that has its weights as safetensors, such as google/efficientnet-b0, or a directory that holds one; "
-            "efficientnet_lite0 needs no network"
+            "that has its weights as safetensors, such as google/efficientnet-b0, or a directory with one (without "
+            "a network: `hf download NAME --local-dir DIRECTORY` elsewhere); efficientnet_lite0 needs no download"
         ) from error
     vision = getattr(model, "vision_model", model)
     if getattr(vision, "main_input_name", None) != "pixel_values":

@@ -174,6 +174,8 @@ def open_demos(run: RunConfig, console: Console) -> Demos:
     Raises:
         BootifolError: there are no expert videos, or they do not match the task and the configuration.
     """
+    # First, for a name that is not known should be heard of before videos are read or recorded.
+    backbone = build_backbone(run)
     root = Path(run.demos)
     paths = find_demo_sets(root)
     if "expert" not in paths:
@@ -203,7 +205,6 @@ def open_demos(run: RunConfig, console: Console) -> Demos:
             episode_steps=expert.manifest.frames - 1,
             action_repeat=run.training.action_repeat,
         )
-    backbone = build_backbone(run)
     held_out = min(run.training.evaluation.held_out_videos, len(expert) // 5)
     sources: dict[str, VideoSource] = {}
     kept: dict[str, list[Video]] = {}
