@@ -82,11 +82,10 @@ def test_another_run_finds_the_features_of_the_videos(
     )
 
 
-@pytest.mark.parametrize("config", [TINY, WITH_DEMONSTRATIONS], ids=["paper", "cloning"])
 def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
-    demos: Path, tmp_path: Path, tiny_backbone: str, monkeypatch: pytest.MonkeyPatch, config: TrainingConfig
+    demos: Path, tmp_path: Path, tiny_backbone: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    config = with_backbone(config, tiny_backbone)
+    config = with_backbone(WITH_DEMONSTRATIONS, tiny_backbone)
     whole = new_run(tmp_path / "whole", demos, config=config)
     assert whole.learn()
     play = InteractivePhase.play_episode
