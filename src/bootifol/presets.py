@@ -21,7 +21,7 @@ from bootifol.training.config import (
 )
 from bootifol.training.demonstrations import DemonstrationConfig
 
-PresetName = Literal["paper", "cpu", "demo", "drawn", "smoke"]
+PresetName = Literal["paper", "cpu", "demo", "drawn", "smoke", "backbone"]
 
 PAPER = TrainingConfig()
 """The paper's hyperparameters to the digit: they are the defaults of every field."""
@@ -90,6 +90,16 @@ Beyond smaller sizes it departs from the paper where the paper's choice needs mo
 `cloning_weight` of the agent, and `demonstrations`, by which the policy starts as a clone of the videos; each is
 described at its field.
 """
+
+BACKBONE = TrainingConfig(
+    pictures=PictureConfig(video_size=224),
+    reward=RewardConfig(BootifolConfig(backbone="google/efficientnet-b0")),
+    interactive=InteractiveConfig(agent_videos=1500),
+    episode_steps=50,
+)
+"""The paper's Eff-BootIfOL: EfficientNet-B0, 1500 videos of 51 frames at 224x224; all else is `paper`. Its table has
+one N_train for everything, 375K; the authors' released configurations stop the encoders earlier, after 60K (Button
+Press), 112.5K (Plate Slide) and 350K agent steps (Drawer Close): `--interactive.reward-updates-until`."""
 
 DEMO = replace(
     CPU,
@@ -173,6 +183,7 @@ PRESETS: dict[PresetName, TrainingConfig] = {
     "demo": DEMO,
     "drawn": DRAWN,
     "smoke": SMOKE,
+    "backbone": BACKBONE,
 }
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -26,6 +26,12 @@ Frames = NDArray[np.uint8]
 
 FrameBatch = NDArray[np.uint8]
 """Videos of one length, uint8 `[B, T + 1, H, W, 3]`."""
+
+Features = NDArray[np.float32]
+"""What a frozen pretrained network made of the pictures of one episode, float32 `[T + 1, F]`."""
+
+FeatureBatch = NDArray[np.float32]
+"""Features of videos of one length, float32 `[B, T + 1, F]`."""
 
 Observation = NDArray[np.uint8]
 """What the agent sees: the newest frames stacked along channels, oldest first, uint8 `[H, W, 3 * stack]`."""
@@ -51,11 +57,14 @@ class Video:
     """Unique among the videos of one run; caches of encodings use it as their key."""
 
     frames: Frames
-    """uint8 `[T + 1, H, W, 3]` at the size the reward model reads."""
+    """uint8 `[T + 1, H, W, 3]` at the size the reward model reads; of 0x0 pixels where features alone are kept."""
 
     environment_rewards: Rewards | None = None
     """The true rewards `[T]`. None, except on the agent's own episodes under the method named
     `environment` (the upper bound), which is the only one that may read them."""
+
+    features: Features | None = None
+    """Of the frames, where the reward model has a frozen backbone and they were computed already."""
 
 
 @dataclass(frozen=True)
@@ -112,4 +121,13 @@ class VideoSource(Protocol):
 
     def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
         """`count` videos drawn uniformly, without repetition where there are enough."""
+        ...
+
+
+@runtime_checkable
+class FeatureSource(VideoSource, Protocol):
+    """Videos to draw from whose features were computed once."""
+
+    def sample_features(self, count: int, rng: np.random.Generator) -> FeatureBatch:
+        """The features of the videos that `sample` would give."""
         ...

@@ -85,3 +85,40 @@ def test_wrong_sizes_are_refused() -> None:
 
 def test_it_says_its_memory_before_taking_it() -> None:
     assert AgentVideos.bytes_needed(5000, 61, 64) == 5000 * 61 * 64 * 64 * 3
+
+
+def featured(index: int, frames: int = FRAMES) -> Video:
+    features = np.arange(frames * 2, dtype=np.float32).reshape(frames, 2) + 100 * index
+    return Video(f"agent-{index}", np.zeros((frames, SIZE, SIZE, 3), np.uint8), features=features)
+
+
+def test_features_are_kept_in_place_of_pixels(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    ring, restored = (AgentVideos(2, FRAMES, SIZE, feature_size=2) for _ in range(2))
+    for index in range(3):
+        ring.add(featured(index, frames=3 if index == 1 else FRAMES))
+    assert [ring[slot].name for slot in range(2)] == ["agent-2", "agent-1"]
+    assert ring[0].frames.shape == (FRAMES, 0, 0, 3)
+    np.testing.assert_array_equal(ring[0].features, featured(2).features)
+    short = featured(1, frames=3).features
+    assert short is not None
+    np.testing.assert_array_equal(ring[1].features, short[[0, 1, 2, 2, 2]])
+    write_arrays(tmp_path / "ring.safetensors", ring.state())
+    restored.load_state(read_arrays(tmp_path / "ring.safetensors", "the ring"))
+    one, other = (each.sample_features(2, np.random.default_rng(1)) for each in (ring, restored))
+    np.testing.assert_array_equal(one, other)
+    assert one.shape == (2, FRAMES, 2)
+    assert AgentVideos.bytes_needed(1500, 51, 224, 1280) == 1500 * 51 * 1280 * 4
+
+
+def test_a_ring_of_features_refuses_videos_without_them() -> None:
+    ring = AgentVideos(2, FRAMES, SIZE, feature_size=3)
+    with pytest.raises(
+        BootifolError, match=r"agent-0 has features \[5, 2\] and .* kept as 3 features a frame"
+    ):
+        ring.add(featured(0))
+    with pytest.raises(BootifolError, match="plain has no features"):
+        ring.add(Video("plain", moving_videos(1)[0]))
+    assert len(ring) == 0
+    pixels = AgentVideos(2, FRAMES, SIZE)
+    pixels.add(featured(0))
+    assert pixels[0].features is None and pixels[0].frames.shape == (FRAMES, SIZE, SIZE, 3)

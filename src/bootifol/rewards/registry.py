@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bootifol.errors import BootifolError
+from bootifol.networks.backbones import Backbone, load_backbone
 from bootifol.own_modules import is_own_name, own_callable
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
@@ -64,6 +65,24 @@ def check_method(method: str) -> None:
             f"there is no reward method {method!r}; choose one of {', '.join(METHODS)}, or write MODULE:NAME for one "
             "of your own"
         )
+
+
+def make_backbone(method: str, config: RewardConfig, video_size: int, device: str = "cpu") -> Backbone | None:
+    """The frozen network whose features a method reads instead of pixels; None where it reads pixels.
+
+    Args:
+        method: a key of METHODS.
+        config: of all methods.
+        video_size: side of the videos in pixels.
+        device: where to compute, as PyTorch names it.
+
+    Raises:
+        BootifolError: the backbone cannot be loaded, or cannot read videos of that size.
+    """
+    own = config.bootifol
+    if method != "bootifol" or own.backbone is None:
+        return None
+    return load_backbone(own.backbone, video_size, own.precision, device)
 
 
 def make_reward_model(

@@ -57,7 +57,7 @@ def train_policy(
         out: directory of the run, new or empty.
         method: bootifol, virl, context_translation, gaifo, environment for the upper bound, or `module:name` for
             one of your own.
-        preset: paper, cpu, demo, drawn or smoke.
+        preset: paper, cpu, demo, drawn, smoke or backbone.
         seed: of everything random.
         time_budget: seconds of wall-clock time for learning; None for the configuration's agent steps.
         config: instead of the preset's.

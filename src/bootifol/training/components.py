@@ -16,13 +16,15 @@ from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.demos.check import differences
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.features import FeaturizedVideos, without_pixels
 from bootifol.demos.manifest import read_manifest
 from bootifol.demos.record import record
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import KINDS
+from bootifol.networks.backbones import Backbone
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import EncodesFrames, RewardModel
-from bootifol.rewards.registry import make_reward_model
+from bootifol.rewards.registry import make_backbone, make_reward_model
 from bootifol.tasks import make_environment
 from bootifol.training.checkpoint import Stateful
 from bootifol.training.demonstrations import Demonstrations
@@ -49,6 +51,8 @@ class Components:
     """The parts of a run that learn or remember."""
 
     reward_model: RewardModel
+    backbone: Backbone | None
+    """Frozen, and so no part of a checkpoint; None where the reward model reads pixels."""
     agent: DrQv2
     replay: ReplayBuffer
     agent_videos: AgentVideos
@@ -73,6 +77,11 @@ def build_environment(run: RunConfig, episode_steps: int) -> gymnasium.Env[Any, 
 def build_reward_model(run: RunConfig) -> RewardModel:
     """The method's reward model, untrained."""
     return make_reward_model(run.method, run.training.reward, run.training.pictures.video_size, run.seed)
+
+
+def build_backbone(run: RunConfig) -> Backbone | None:
+    """The frozen network whose features the reward model reads; None where it reads pixels."""
+    return make_backbone(run.method, run.training.reward, run.training.pictures.video_size)
 
 
 def build_agent(run: RunConfig, environment: gymnasium.Env[Any, Any], reward_model: RewardModel) -> DrQv2:
@@ -104,6 +113,11 @@ def _encodings(run: RunConfig, reward_model: RewardModel) -> FrameEncodings:
         raise BootifolError(
             f"agent.observations encodings needs a method that encodes single frames, which {run.method} does not: "
             "choose --method bootifol, or --agent.observations pictures"
+        )
+    if build_backbone(run) is not None:
+        raise BootifolError(
+            "agent.observations encodings does not go with a backbone, which would read every picture of every batch "
+            "anew: choose --agent.observations pictures, or no backbone"
         )
     if pictures.agent_size < pictures.video_size:
         raise BootifolError(
@@ -152,11 +166,18 @@ def build_components(
     action_dim = environment.action_space.shape[0]
     frames = run.resolved_task().episode_steps + 1
     reward_model = build_reward_model(run)
+    backbone = build_backbone(run)
+    ring = (
+        config.interactive.agent_videos,
+        frames,
+        pictures.video_size,
+        backbone.feature_size if backbone else 0,
+    )
     # The upper bound has no demonstrations: it learns from true rewards, which videos do not tell.
     demonstrated = 0 if reward_model.reads_environment_reward else demonstrated_videos(run, expert)
     size = pictures.agent_size
     replay_bytes = ReplayBuffer.bytes_needed(config.agent.replay_capacity, size, action_dim)
-    video_bytes = AgentVideos.bytes_needed(config.interactive.agent_videos, frames, pictures.video_size)
+    video_bytes = AgentVideos.bytes_needed(*ring)
     parts = [
         f"replay {replay_bytes / 1e9:.2f} GB ({config.agent.replay_capacity:,} frames)",
         f"the agent's videos {video_bytes / 1e9:.2f} GB ({config.interactive.agent_videos:,} episodes)",
@@ -167,6 +188,7 @@ def build_components(
     console.print(f"memory when full: {', '.join(parts)}")
     return Components(
         reward_model=reward_model,
+        backbone=backbone,
         agent=build_agent(run, environment, reward_model),
         replay=ReplayBuffer(
             config.agent.replay_capacity,
@@ -177,7 +199,7 @@ def build_components(
             config.agent.discount,
             _shift(run),
         ),
-        agent_videos=AgentVideos(config.interactive.agent_videos, frames, pictures.video_size),
+        agent_videos=AgentVideos(*ring),
         demonstrations=build_demonstrations(run, expert, action_dim) if demonstrated else None,
     )
 
@@ -188,6 +210,8 @@ def open_demos(run: RunConfig, console: Console) -> Demos:
     Raises:
         BootifolError: there are no expert videos, or they do not match the task and the configuration.
     """
+    # First, for a name that is not known should be heard of before videos are read or recorded.
+    backbone = build_backbone(run)
     root = Path(run.demos)
     paths = find_demo_sets(root)
     if "expert" not in paths:
@@ -225,8 +249,15 @@ def open_demos(run: RunConfig, console: Console) -> Demos:
             continue
         demo_set = expert if kind == "expert" else _open(paths[kind], run)
         training, aside = demo_set.split(min(held_out, len(demo_set) - 1))
-        sources[kind] = training
-        kept[kind] = [aside[index] for index in range(len(aside))]
+        if backbone is None:
+            sources[kind] = training
+            kept[kind] = [aside[index] for index in range(len(aside))]
+            continue
+        sources[kind] = featurized = FeaturizedVideos(training, backbone)
+        if kind in ("expert", "random"):
+            featurized.compute()
+        featurized_aside = FeaturizedVideos(aside, backbone)
+        kept[kind] = without_pixels(featurized_aside[index] for index in range(len(aside)))
     return Demos(sources["expert"], sources["random"], kept if held_out else {})
 
 

@@ -16,6 +16,7 @@ from bootifol.agents.drqv2 import DrQv2
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.envs.rollout import EpisodeRecorder, rollout
 from bootifol.evaluation.ranking import draw_references
+from bootifol.networks.backbones import Backbone
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
 from bootifol.tracking import Averages
@@ -49,6 +50,8 @@ class InteractivePhase:
     seed: int
     rng: np.random.Generator
     """Draws reference videos and replay batches."""
+    backbone: Backbone | None = None
+    """Computes the features of every frame once, where the reward model reads features."""
 
     def __post_init__(self) -> None:
         self.averages = Averages()
@@ -72,9 +75,10 @@ class InteractivePhase:
             self._update_agent()
             self._update_reward()
         episode = recorder.episode()
-        rewards = self.reward_model.label(episode.video, references)
+        video = episode.video if self.backbone is None else self.backbone.with_features(episode.video)
+        rewards = self.reward_model.label(video, references)
         self.replay.add(episode, rewards)
-        self.agent_videos.add(episode.video)
+        self.agent_videos.add(video)
         self.counters.episodes += 1
         self.counters.interactive_seconds += self._watch.lap()
         self.averages.add({"episode/learned_reward": float(rewards.mean())})

@@ -26,6 +26,7 @@ _PACKAGES = (
     "gymnasium",
     "numba",
     "safetensors",
+    "transformers",
 )
 _Config = TypeVar("_Config")
 

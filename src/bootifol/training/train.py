@@ -93,6 +93,7 @@ class Run:
             self.counters,
             self.run.seed,
             self.rng,
+            self.components.backbone,
         )
         self._saved_at = time.monotonic()
         self._last_evaluation: dict[str, float] = {}

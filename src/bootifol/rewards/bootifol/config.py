@@ -16,6 +16,13 @@ class BootifolConfig:
     """distance (the paper): minus the Euclidean distance between the encodings of agent and expert.
     cosine (the authors' released code): their cosine similarity, in [-1, 1]."""
 
+    backbone: str | None = None
+    """None: g_theta learns from pixels (the paper's BootIfOL). A name: g_theta is this frozen pretrained network and
+    two layers that learn (Eff-BootIfOL), without L_S (there are no Lab views) and L_ae (there is no decoder), and
+    with `width_divisor` and `frames_per_video` for nothing but L_triplet. efficientnet_lite0, or any vision model of
+    the Hugging Face hub, such as google/efficientnet-b0 (the paper's) or facebook/dinov2-small, or a directory with
+    one; most want pictures.video_size 224."""
+
     references: int = 1
     """Expert videos an episode is compared with; the paper compares with one."""
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import cast
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from bootifol.errors import BootifolError
+from bootifol.networks.backbones import load_backbone
 from bootifol.networks.color import lab_views
 from bootifol.networks.frame_encoders import STATE_SIZE
 from bootifol.rewards.bootifol import losses
@@ -18,11 +21,25 @@ from bootifol.rewards.bootifol.scale import DistanceScale
 from bootifol.rewards.bootifol.spoiled import spoiled
 from bootifol.rewards.learned import LearnedRewardModel
 from bootifol.rewards.video_checks import check_references
-from bootifol.types import Arrays, FrameBatch, Frames, Metrics, Rewards, Video, VideoSource
+from bootifol.types import (
+    Arrays,
+    FeatureBatch,
+    Features,
+    FeatureSource,
+    FrameBatch,
+    Frames,
+    Metrics,
+    Rewards,
+    Video,
+    VideoSource,
+)
 
 
 class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
     """A distance between videos, learned from expert videos and others.
+
+    With a backbone, it learns from features that were computed before: `align` and `update` want a `FeatureSource`.
+    `label` computes those of a video that has none.
 
     Args:
         config: see there.
@@ -35,7 +52,20 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
     encoding_dim = STATE_SIZE
 
     def __init__(self, config: BootifolConfig, video_size: int, seed: int, device: str = "cpu") -> None:
-        super().__init__(BootifolNetworks, config, video_size, seed, device)
+        # Frozen, and therefore no part of the networks that learn and are stored.
+        self.backbone = (
+            None
+            if config.backbone is None
+            else load_backbone(config.backbone, video_size, config.precision, device)
+        )
+        feature_size = self.backbone.feature_size if self.backbone else None
+        super().__init__(
+            lambda config, size: BootifolNetworks(config, size, feature_size),
+            config,
+            video_size,
+            seed,
+            device,
+        )
         self.reference_count = config.references
         self._scale = DistanceScale()
         self._encodings: dict[str, torch.Tensor] = {}
@@ -56,8 +86,8 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         """
         check_references(video, references, self.reference_count)
         length = len(video.frames)
-        missing = {item.name: item.frames for item in references if item.name not in self._encodings}
-        fresh = self._encode([video.frames, *missing.values()])
+        missing = {item.name: item for item in references if item.name not in self._encodings}
+        fresh = self._encode([video, *missing.values()])
         self._encodings.update(zip(missing, fresh[1:], strict=True))
         encoding = fresh[0][1:]
         compared = torch.stack([self._encodings[item.name][1:length] for item in references])
@@ -72,7 +102,7 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
 
     def embed(self, frames: Frames) -> NDArray[np.float32]:
         """Encodings z of every prefix of a video: `[T + 1, H, W, 3]` to `[T + 1, 128]`."""
-        encoding: NDArray[np.float32] = self._encode([frames])[0].numpy()
+        encoding: NDArray[np.float32] = self._encode([Video("", frames)])[0].numpy()
         return encoding
 
     def encode_frames(self, frames: Frames) -> torch.Tensor:
@@ -81,24 +111,36 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         return states.clone()  # one that autograd may keep, which a tensor of inference mode is not
 
     def state(self) -> Arrays:
-        """What every reward model has, and the reward scale."""
-        return {**super().state(), "reward_scale": self._scale.means.copy()}
+        """What every reward model has, the reward scale, and the checksum of the backbone's weights."""
+        state = {**super().state(), "reward_scale": self._scale.means.copy()}
+        if self.backbone:
+            state["backbone"] = np.frombuffer(self.backbone.fingerprint.encode(), np.uint8).copy()
+        return state
 
     def load_state(self, arrays: Arrays) -> None:
-        """The inverse of `state`."""
+        """The inverse of `state`.
+
+        Raises:
+            BootifolError: as every reward model's; or it was learned from the features of another backbone.
+        """
         super().load_state(arrays)
+        if self.backbone and arrays["backbone"].tobytes().decode() != self.backbone.fingerprint:
+            raise BootifolError(
+                f"the reward was learned from features of other weights than those of {self.backbone.name} here; "
+                "restore the weights, or start a new run"
+            )
         self._scale.means = arrays["reward_scale"].astype(np.float64)
         self._encodings.clear()
 
     def _step(self, expert: VideoSource, other: VideoSource, scaling: bool) -> Metrics:
         """Algorithm 1: sample n and n videos, evaluate L, optimize theta, gamma, omega, phi."""
         n = self.config.videos_per_class
-        expert_videos, other_videos = self._sample(expert, n), self._sample(other, n)
+        expert_videos, other_videos = self._read(expert, n), self._read(other, n)
         spoiled_count = int(self.config.spoiled_share * n)
         length = min(expert_videos.shape[1], other_videos.shape[1])
         videos = np.concatenate([expert_videos[:, :length], other_videos[:, :length]])
         if spoiled_count:
-            shown = self._sample(expert, spoiled_count)
+            shown = self._read(expert, spoiled_count)
             videos[-spoiled_count:] = spoiled(shown[:, :length], self._rng)
         drawn = draw(self.config, 2 * n, length, self._rng)
         step = self._begin_step()
@@ -111,18 +153,18 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         return metrics
 
     def _losses(
-        self, videos: FrameBatch, drawn: Draw
+        self, videos: FrameBatch | FeatureBatch, drawn: Draw
     ) -> tuple[torch.Tensor, dict[str, float], NDArray[np.float64]]:
-        """L and its terms on n expert videos followed by n others, uint8 `[2n, T' + 1, H, W, 3]`.
+        """L and its terms on n expert videos followed by n others, `[2n, T' + 1, H, W, 3]` or `[2n, T' + 1, F]`.
 
         Returns:
             L; the metrics; the distance of each expert's and other's encodings at every kept frame, `[n, T' + 1]`.
         """
         config = self.config
         count, length = videos.shape[:2]
-        lightness, color = self._views(videos.reshape(-1, *videos.shape[2:]))
+        inputs = self._inputs(videos.reshape(-1, *videos.shape[2:]))
         with self._autocast():
-            states = self.networks.frame_encoder(lightness, color).float()
+            states = self.networks.frame_encoder(*inputs).float()
         within = np.arange(count)[:, None] * length
         anchors = self._indices(within + drawn.anchors)
         anchor_states = states[anchors]
@@ -130,7 +172,7 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         weights: dict[str, float] = {}
 
         half = states.shape[1] // 2
-        if config.multiview_weight > 0:
+        if config.multiview_weight > 0 and not self.backbone:
             terms["multiview"] = losses.multiview_loss(
                 anchor_states[:, :half], anchor_states[:, half:], config.temperature
             )
@@ -141,10 +183,10 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
                 states[self._indices(within + drawn.negatives)],
                 config.margin,
             )
-        if config.autoencoder_weight > 0:
+        if config.autoencoder_weight > 0 and self.networks.frame_decoder is not None:
             with self._autocast():
                 decoded = self.networks.frame_decoder(anchor_states)
-            picture = torch.cat([lightness[anchors], color[anchors]], dim=1)
+            picture = torch.cat([view[anchors] for view in inputs], dim=1)
             terms["autoencoder"] = losses.autoencoder_loss(picture, decoded)
 
         sequences = states.unflatten(0, (count, length))
@@ -170,23 +212,52 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         metrics["distance/expert_other"] = float(distances.mean())
         return total, metrics, distances
 
-    def _encode(self, videos: Sequence[Frames]) -> list[torch.Tensor]:
-        """Encodings `[T + 1, 128]` of each video, in evaluation mode: a frame's state depends on that frame alone."""
-        states = self._frame_states(np.concatenate([self._checked(video) for video in videos]))
-        with self._evaluating():
-            parts = torch.split(states, [len(video) for video in videos])
-            return [self.networks.sequence_encoder(part[None])[0][0].cpu() for part in parts]
+    def _encode(self, videos: Sequence[Video]) -> list[torch.Tensor]:
+        """Encodings `[T + 1, 128]` of each video, in evaluation mode: a frame's state depends on that frame alone.
 
-    def _frame_states(self, frames: Frames) -> torch.Tensor:
-        """s `[N, 128]` of frames uint8 `[N, H, W, 3]`, in evaluation mode."""
+        Each video is encoded by itself: the last bits of a matrix product depend on how many rows it has, and a
+        resumed run may encode a reference beside another video than the uninterrupted run did.
+        """
+        encodings: list[torch.Tensor] = []
+        for video in videos:
+            states = self._frame_states(self._checked_inputs(video))
+            with self._evaluating():
+                encodings.append(self.networks.sequence_encoder(states[None])[0][0].cpu())
+        return encodings
+
+    def _frame_states(self, frames: Frames | Features) -> torch.Tensor:
+        """s `[N, 128]` of frames, or of their features, in evaluation mode."""
+        inputs = self._inputs(frames)
         with self._evaluating(), self._autocast():
-            states: torch.Tensor = self.networks.frame_encoder(*self._views(frames)).float()
+            states: torch.Tensor = self.networks.frame_encoder(*inputs).float()
             return states
 
-    def _views(self, frames: Frames) -> tuple[torch.Tensor, torch.Tensor]:
-        """uint8 `[N, H, W, 3]` to the views L `[N, 1, H, W]` and ab `[N, 2, H, W]`."""
+    def _read(self, source: VideoSource, count: int) -> FrameBatch | FeatureBatch:
+        """Videos drawn at random, as g_theta reads them: `[count, T + 1, H, W, 3]` or features `[count, T + 1, F]`."""
+        if not self.backbone:
+            return self._sample(source, count)
+        features = source.sample_features(count, self._rng) if isinstance(source, FeatureSource) else None
+        if features is None or features.shape[2] != self.backbone.feature_size:
+            raise BootifolError(
+                f"the reward model learns from features of the backbone {self.backbone.name}, and these videos have "
+                "none of it: wrap a demo set in bootifol.demos.features.FeaturizedVideos"
+            )
+        return features
+
+    def _checked_inputs(self, video: Video) -> Frames | Features:
+        """What g_theta reads of a video, `[T + 1, H, W, 3]` or `[T + 1, F]`."""
+        if not self.backbone:
+            return self._checked(video.frames)
+        features = self.backbone.with_features(video).features
+        assert features is not None
+        return features
+
+    def _inputs(self, frames: Frames | Features) -> tuple[torch.Tensor, ...]:
+        """Pixels `[N, H, W, 3]` to the views L `[N, 1, H, W]` and ab `[N, 2, H, W]`; features `[N, F]` as they are."""
+        if self.backbone:
+            return (torch.from_numpy(frames).to(self.device),)
         dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32
-        lightness, color = lab_views(frames, dtype)
+        lightness, color = lab_views(cast(Frames, frames), dtype)
         return lightness.to(self.device), color.to(self.device)
 
     def _aggregate(self, rewards: torch.Tensor) -> torch.Tensor:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import nn
 
+from bootifol.networks.feature_encoder import FeatureEncoder
 from bootifol.networks.frame_decoder import FrameDecoder
 from bootifol.networks.frame_encoders import FrameEncoder
 from bootifol.networks.sequence_encoder import SequenceEncoder, StatePredictor
@@ -12,12 +13,25 @@ from bootifol.rewards.bootifol.config import BootifolConfig
 
 
 class BootifolNetworks(nn.Module):
-    """g_theta, q_gamma, f_omega and d_phi."""
+    """g_theta, q_gamma, f_omega and d_phi.
 
-    def __init__(self, config: BootifolConfig, video_size: int) -> None:
+    Args:
+        config: see there.
+        video_size: side of the videos in pixels.
+        feature_size: of a frozen backbone, which is no part of this module; g_theta then reads features, and there is
+            no q_gamma. None: g_theta reads pixels.
+    """
+
+    def __init__(self, config: BootifolConfig, video_size: int, feature_size: int | None = None) -> None:
         super().__init__()
-        self.frame_encoder = FrameEncoder(video_size, config.width_divisor, config.leak)
-        self.frame_decoder = FrameDecoder(video_size, config.width_divisor, config.leak)
+        self.frame_encoder: FrameEncoder | FeatureEncoder
+        self.frame_decoder: FrameDecoder | None
+        if feature_size is None:
+            self.frame_encoder = FrameEncoder(video_size, config.width_divisor, config.leak)
+            self.frame_decoder = FrameDecoder(video_size, config.width_divisor, config.leak)
+        else:
+            self.frame_encoder = FeatureEncoder(feature_size, config.leak)
+            self.frame_decoder = None
         self.sequence_encoder = SequenceEncoder(config.motion)
         self.state_predictor = StatePredictor(config.leak)
 

@@ -7,16 +7,18 @@ moves just as smoothly: what is left to tell it apart is the task.
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
-from bootifol.types import FrameBatch
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 LATEST_TURN = 0.2
 """A video stops or turns back within this part of its length, before most experts have arrived."""
 
 
-def spoiled(videos: FrameBatch, rng: np.random.Generator) -> FrameBatch:
+def spoiled(videos: NDArray[Scalar], rng: np.random.Generator) -> NDArray[Scalar]:
     """Each video in one of three ways, drawn at random.
 
     - it stops early and stands still;
@@ -24,7 +26,7 @@ def spoiled(videos: FrameBatch, rng: np.random.Generator) -> FrameBatch:
     - it runs backward from a later moment to its start, and stands still.
 
     Args:
-        videos: expert videos, `[n, T + 1, H, W, 3]`.
+        videos: expert videos, pixels `[n, T + 1, H, W, 3]` or features `[n, T + 1, F]`.
         rng: draws the way and the moment.
 
     Returns:
@@ -34,7 +36,7 @@ def spoiled(videos: FrameBatch, rng: np.random.Generator) -> FrameBatch:
     ways = rng.integers(3, size=(count,))
     turns = 1 + rng.integers(max(int(LATEST_TURN * (frames - 1)), 1), size=(count,))
     order = np.stack([_order(int(ways[i]), int(turns[i]), frames) for i in range(count)])
-    result: FrameBatch = videos[np.arange(count)[:, None], order]
+    result: NDArray[Scalar] = videos[np.arange(count)[:, None], order]
     return result
 
 
