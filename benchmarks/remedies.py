@@ -24,7 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.resumable_table import ResumableTable
-from bootifol.agents.drqv2 import DrQv2Config
+from bootifol.agents.config import DrQv2Config
 from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
 from bootifol.evaluation.returns import evaluate, scaled_return

@@ -9,9 +9,9 @@ import pytest
 import torch
 from benchmarks.plain.drqv2 import PlainDrQv2, PlainEncoder
 
+from bootifol.agents.config import DrQv2Config
 from bootifol.agents.drqv2 import (
     DrQv2,
-    DrQv2Config,
     actor_loss,
     critic_loss,
     critic_target,

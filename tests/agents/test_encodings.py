@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from bootifol.agents.drqv2 import DrQv2, DrQv2Config
+from bootifol.agents.config import DrQv2Config
+from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.encodings import FrameEncodings
 from bootifol.errors import BootifolError
 from bootifol.rewards.base import EncodesFrames

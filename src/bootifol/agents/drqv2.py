@@ -10,147 +10,20 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from bootifol.agents.config import DrQv2Config
 from bootifol.agents.encodings import FrameEncodings
-from bootifol.agents.networks import Actor, Critic, Encoder, EncoderName, EncodingEncoder, initialize
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.agents.networks import Actor, Critic, Encoder, EncodingEncoder, initialize
+from bootifol.errors import BootifolError
 from bootifol.types import Action, Arrays, Batch, Metrics, Observation
-
-Precision = Literal["bf16", "fp32"]
-Observations = Literal["pictures", "encodings"]
 
 SATURATED = 0.98
 """Mean actions beyond this are counted as saturated in the metrics."""
-
-
-@dataclass(frozen=True)
-class DrQv2Config:
-    """DrQ-v2; the defaults are those of its paper, with the replay of the BootIfOL paper."""
-
-    observations: Observations = "pictures"
-    """pictures: convolutions of the agent's own read the frames (the paper's agent). encodings: an MLP reads what the
-    reward model's frame encoder makes of them, always its newest version and without a random shift (the paper's
-    ablation of it); for reward methods that encode single frames."""
-
-    encoder: EncoderName = "paper"
-    """Convolutions over the frame stack. paper: four 3x3 layers of 32 channels, strides 2, 1, 1, 1.
-    strided: the same with strides 2, 2, 1, 1. coarse: 8x8 stride 4, 4x4 stride 2, 3x3 (32, 64, 64 channels),
-    the cheapest."""
-
-    feature_dim: int = 50
-    """Width of the trunks between the encoder and the actor's and critic's heads."""
-
-    hidden_dim: int = 1024
-    """Width of the two hidden layers of the actor and of each critic."""
-
-    batch_size: int = 256
-    """Transitions an update learns from."""
-
-    update_every: int = 2
-    """Agent steps an update."""
-
-    n_step: int = 3
-    """Rewards summed before bootstrapping."""
-
-    discount: float = 0.99
-    """Discount of future rewards an agent step."""
-
-    learning_rate: float = 1e-4
-    """Of Adam, for encoder, critic and actor."""
-
-    target_rate: float = 0.01
-    """How far the target critic moves to the critic at each update (tau)."""
-
-    exploration_start: float = 1.0
-    """Standard deviation of the action noise at the first agent step."""
-
-    exploration_end: float = 0.1
-    """Standard deviation of the action noise once exploration_steps have passed."""
-
-    exploration_steps: int = 500_000
-    """Agent steps over which the noise falls linearly."""
-
-    noise_clip: float = 0.3
-    """Largest noise on the actions that the losses evaluate; the actions taken are not so limited."""
-
-    warm_up_steps: int = 1920
-    """Agent steps of uniformly random actions before the first update; the Interactive Phase draws them."""
-
-    warm_up_hold: int = 1
-    """Largest number of agent steps that a random action of the warm-up is repeated for, drawn anew each time. 1, as
-    in the paper, never. Held actions reach speeds that trembling does not, and inverse dynamics needs to see them."""
-
-    replay_capacity: int = 100_000
-    """Frames that replay holds; an episode of T transitions takes T + 1."""
-
-    shift: int = 4
-    """Largest random shift of the pictures in pixels."""
-
-    saturation_weight: float = 0.0
-    """Beyond DrQ-v2: weight of `saturation_loss` beside the actor's; 0, as in its paper, leaves it out. Where tanh is
-    saturated no gradient passes, and an actor that early estimates sent into a corner never comes back."""
-
-    cloning_weight: float = 0.0
-    """Beyond the paper: how strongly actor and encoder are pulled to the inferred actions of expert videos, relative
-    to the mean of |Q| or 1, whichever is larger; 0, as in the paper, not at all. Needs `demonstrations`."""
-
-    averaging: float = 0.0
-    """Beyond DrQ-v2: without exploration the policy acts with running averages of encoder and actor, which keep this
-    share of themselves at each update and so even out the noise of the last ones; 0, as in its paper, the newest."""
-
-    precision: Precision = "bf16"
-    """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""
-
-    def __post_init__(self) -> None:
-        for name, choices in (
-            ("observations", get_args(Observations)),
-            ("encoder", get_args(EncoderName)),
-            ("precision", get_args(Precision)),
-        ):
-            if getattr(self, name) not in choices:
-                raise BootifolError(
-                    f"agent {name} must be one of {', '.join(choices)}, not {getattr(self, name)}"
-                )
-        at_least_one = (
-            "feature_dim",
-            "hidden_dim",
-            "batch_size",
-            "update_every",
-            "warm_up_hold",
-            "n_step",
-            "replay_capacity",
-        )
-        not_negative = (
-            "exploration_start",
-            "exploration_end",
-            "exploration_steps",
-            "noise_clip",
-            "saturation_weight",
-            "cloning_weight",
-            "warm_up_steps",
-            "shift",
-        )
-        for names, least in ((at_least_one, 1), (not_negative, 0)):
-            require_at_least(least, **{f"agent {name}": getattr(self, name) for name in names})
-        for name in ("discount", "target_rate"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise BootifolError(f"agent {name} must lie in [0, 1], not {getattr(self, name)}")
-        if not 0 <= self.averaging < 1:
-            raise BootifolError(f"agent averaging must lie in [0, 1), not {self.averaging}")
-        if not self.learning_rate > 0:
-            raise BootifolError(f"agent learning_rate must be positive, not {self.learning_rate}")
-
-    def exploration(self, agent_steps: float) -> float:
-        """Standard deviation of the noise after so many agent steps."""
-        passed = min(agent_steps / self.exploration_steps, 1.0) if self.exploration_steps else 1.0
-        return self.exploration_start + passed * (self.exploration_end - self.exploration_start)
 
 
 def critic_target(reward: Tensor, discount: Tensor, next_q1: Tensor, next_q2: Tensor) -> Tensor:

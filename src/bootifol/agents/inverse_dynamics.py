@@ -11,7 +11,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from bootifol.agents.networks import Encoder, EncoderName
+from bootifol.agents.config import EncoderName
+from bootifol.agents.networks import Encoder
 from bootifol.errors import BootifolError
 from bootifol.types import Arrays, Batch, Frames, Metrics
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import torch
 from torch import Tensor, nn
 
-EncoderName = Literal["paper", "strided", "coarse"]
+from bootifol.agents.config import EncoderName
 
 _CONVOLUTIONS: dict[EncoderName, tuple[tuple[int, int, int], ...]] = {
     "paper": ((32, 3, 2), (32, 3, 1), (32, 3, 1), (32, 3, 1)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from bootifol.agents.drqv2 import DrQv2Config
+from bootifol.agents.config import DrQv2Config
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import require_at_least
 from bootifol.rewards.registry import RewardConfig
