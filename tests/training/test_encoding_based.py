@@ -12,6 +12,7 @@ from tiny_runs import ENCODING_BASED, new_run
 
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
+from bootifol.rewards.registry import RewardConfig
 from bootifol.training.api import evaluate_run
 from bootifol.training.components import build_agent, build_reward_model
 from bootifol.training.run_config import RunConfig
@@ -53,6 +54,15 @@ def test_pictures_too_small_to_encode_are_refused(demos: Path) -> None:
     config = replace(ENCODING_BASED, pictures=PictureConfig(agent_size=16, video_size=32))
     run = RunConfig("drawn_reach", "bootifol", "smoke", 1, str(demos), None, config)
     with pytest.raises(BootifolError, match=r"16 pixels.*reads 32: pass --pictures\.agent-size 32"):
+        build_agent(run, None, build_reward_model(run))  # type: ignore[arg-type]
+
+
+def test_encodings_of_a_backbone_are_refused(demos: Path, tiny_backbone: str) -> None:
+    reward = RewardConfig(replace(ENCODING_BASED.reward.bootifol, backbone=tiny_backbone))
+    run = RunConfig(
+        "drawn_reach", "bootifol", "smoke", 1, str(demos), None, replace(ENCODING_BASED, reward=reward)
+    )
+    with pytest.raises(BootifolError, match=r"encodings does not go with a backbone"):
         build_agent(run, None, build_reward_model(run))  # type: ignore[arg-type]
 
 
