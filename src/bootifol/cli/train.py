@@ -42,7 +42,7 @@ def train(
             returns a Gymnasium environment.
         method: bootifol, virl, context_translation and gaifo learn a reward from the videos; environment uses the true
             reward, as an upper bound. MODULE:NAME is a method of your own (docs/add_a_method.md).
-        preset: paper: its hyperparameters to the digit. cpu: 2 cores, about an hour. demo: what `make demo` runs, with
+        preset: paper: its hyperparameters to the digit. cpu: one to two hours on one core. demo: what `make demo` runs, with
             a time budget of minutes. drawn: the tasks drawn with numpy, in two minutes. smoke: every stage, in under
             two minutes. backbone: paper, with a pretrained EfficientNet-B0 that reads videos of 224x224 pixels.
         demos: Directory of the videos, from `bootifol demos record` or `bootifol demos import`.
