@@ -29,9 +29,7 @@ def main() -> None:
         by_steps, by_time = figure.subplots(1, 2)
         draw_return_curves(by_steps, looks, scaled=True)
         draw_return_curves(by_time, looks, scaled=True, by_time=True)
-        by_steps.set_title(
-            "0 is a random agent, 1 the expert; diamonds: whole episodes", loc="left", fontsize=9
-        )
+        by_steps.set_title("0 is a random agent, 1 the expert", loc="left", fontsize=9)
         by_time.legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
         arguments.out.parent.mkdir(parents=True, exist_ok=True)
         with written_aside(arguments.out) as aside:
