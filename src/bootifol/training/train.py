@@ -129,7 +129,7 @@ class Run:
             return True
         averages = Averages()
         model = self.components.reward_model
-        shown = {"loss": float("nan")}
+        shown: dict[str, float] = {}
         unit, done, total = self.budget.alignment_extent(self.counters)
         with progress("aligning the reward", total, done, unit) as advance:
             for metrics in alignment_phase(
@@ -138,7 +138,8 @@ class Run:
                 averages.add(metrics)
                 if self.counters.alignment_steps % config.log_every == 0:
                     means = averages.pop()
-                    shown["loss"] = means.get("loss/total", float("nan"))
+                    if "loss/total" in means:
+                        shown["loss"] = means["loss/total"]
                     self._log("alignment", "gradient_step", self.counters.alignment_steps, means)
                 _, now, _ = self.budget.alignment_extent(self.counters)
                 advance(min(now, total) - done, **shown)
