@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from bootifol.errors import BootifolError
 from bootifol.presets import PAPER, preset
+from bootifol.reports.paper_results import RETURNS
 from bootifol.tasks import short_name, task_named
 from bootifol.training.config import TrainingConfig
 
@@ -223,15 +224,7 @@ class Suite:
         return runs
 
 
-SEVEN_TASKS = (
-    "reacher_hard",
-    "finger_turn_easy",
-    "hopper_stand",
-    "walker_run",
-    "button_press",
-    "plate_slide",
-    "drawer_close",
-)
+SEVEN_TASKS = tuple(RETURNS)
 FIVE_SEEDS = (1, 2, 3, 4, 5)
 THREE_SEEDS = (1, 2, 3)
 _ablation = partial(Suite, preset="cpu", tasks=("reacher_hard",), seeds=THREE_SEEDS)
