@@ -33,9 +33,9 @@ demo: .venv/ready
 	fi
 	@echo "open $(DEMO)/run/report.html in a browser"
 
-# Lint, types, all tests.
+# Lint, types, all tests; a file to a worker, the slow ones first (tests/conftest.py).
 test: check
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
 
 check: .venv/complete
 	$(BIN)/ruff check $(SOURCES)

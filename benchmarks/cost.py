@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -24,8 +24,10 @@ from typing import NamedTuple
 import torch
 from rich.console import Console
 
+from benchmarks.process_memory import status_bytes
 from benchmarks.resumable_table import ResumableTable
-from benchmarks.run_queue import PROGRAM, missing_demos
+from benchmarks.rows import markdown
+from benchmarks.run_queue import PROGRAM, missing_demos, record_words
 from benchmarks.suites import (
     RANDOM,
     VIDEOS,
@@ -117,11 +119,11 @@ def compare(arguments: argparse.Namespace) -> None:
     """Measures what is not in the table yet, one fresh process after another."""
     task = short_name(arguments.task)
     out = arguments.out or Path("results") / task / f"cost_{arguments.preset}.csv"
-    results = ResumableTable(out, tuple(COLUMNS), key=3)
+    results = ResumableTable(out, tuple(COLUMNS), key=4)
     missing = [
         system
         for system in systems(arguments.preset, arguments.systems)
-        if not results.has(arguments.task, arguments.preset, system.name)
+        if not results.has(arguments.task, arguments.preset, system.name, arguments.threads)
     ]
     with tempfile.TemporaryDirectory() as temporary:
         demos = arguments.demos / task
@@ -137,7 +139,7 @@ def compare(arguments: argparse.Namespace) -> None:
             if finished.returncode:
                 raise BootifolError(f"{system.name} could not be measured: its own message is above")
             results.add(json.loads(finished.stdout.splitlines()[-1]))
-    table = markdown(results.rows)
+    table = markdown(list(COLUMNS.values()), [list(row.values()) for row in results.rows]) + "\n"
     with written_aside(out.with_suffix(".md")) as aside:
         aside.write_text(table)
     print(table, end="")
@@ -145,10 +147,7 @@ def compare(arguments: argparse.Namespace) -> None:
 
 def record(task: str, config: TrainingConfig, directory: Path) -> None:
     """A few videos, which cost as much to learn from as many."""
-    pictures = config.pictures
-    words = ["demos", "record", "--task", task, "--episodes", str(FEW_VIDEOS), "--out", str(directory)]
-    words += ["--agent-size", str(pictures.agent_size), "--video-size", str(pictures.video_size)]
-    words += ["--profile", pictures.profile, "--behaviors", "expert", "random"]
+    words = record_words(task, config, directory, FEW_VIDEOS, ("expert", "random"))
     if subprocess.run([*PROGRAM, *words]).returncode:
         raise BootifolError(f"there are no videos of {task} and none could be recorded: see above")
 
@@ -176,7 +175,7 @@ def measured(arguments: argparse.Namespace, system: System) -> dict[str, str]:
             "cpu_seconds_learning": f"{learning.cpu:.1f}",
             "seconds_resting": f"{resting.wall_clock:.1f}",
             "cpu_seconds_resting": f"{resting.cpu:.1f}",
-            "peak_memory_mb": f"{peak_memory() / 1e6:.0f}",
+            "peak_memory_mb": f"{status_bytes('VmHWM') / 1e6:.0f}",
             "stores_mb": f"{stores_when_full(config, run) / 1e6:.0f}",
             "reward_parameters": str(parameters([getattr(reward, "networks", None)])),
             "agent_parameters": str(parameters([agent.encoder, agent.actor, agent.critic])),
@@ -238,23 +237,18 @@ def seconds_per_1000(run: Run, agent_steps: int) -> Seconds:
     )
 
 
-def peak_memory() -> int:
-    """Bytes of memory that this process had at most.
-
-    Not `ru_maxrss`, which on Linux begins with what the process that started this one had.
-    """
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith("VmHWM:"):
-            return 1024 * int(line.split()[1])
-    raise BootifolError("/proc/self/status tells no VmHWM: peak memory is measured on Linux alone")
-
-
 def stores_when_full(config: TrainingConfig, run: Run) -> int:
-    """Bytes of the frames that a whole run of a suite keeps, of which a short one fills next to nothing."""
+    """Bytes of the frames, or of their features, that a whole run of a suite keeps; a short one fills few of them."""
     size, frames = config.pictures.agent_size, run.task.episode_steps + 1
     action_dim = run.interactive.environment.action_space.shape or (0,)
     replay = ReplayBuffer.bytes_needed(config.agent.replay_capacity, size, action_dim[0])
-    videos = AgentVideos.bytes_needed(config.interactive.agent_videos, frames, config.pictures.video_size)
+    backbone = run.components.backbone
+    videos = AgentVideos.bytes_needed(
+        config.interactive.agent_videos,
+        frames,
+        config.pictures.video_size,
+        backbone.feature_size if backbone else 0,
+    )
     demonstrated = 0
     if run.components.demonstrations is not None:
         count = min(config.demonstrations.videos, VIDEOS[run.run.preset])
@@ -265,12 +259,6 @@ def stores_when_full(config: TrainingConfig, run: Run) -> int:
 def parameters(networks: Iterable[torch.nn.Module | None]) -> int:
     """How many numbers they learn."""
     return sum(p.numel() for network in networks if network is not None for p in network.parameters())
-
-
-def markdown(rows: Sequence[Mapping[str, str]]) -> str:
-    """The table for a page."""
-    lines = [list(COLUMNS.values()), ["---"] * len(COLUMNS), *([*row.values()] for row in rows)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 if __name__ == "__main__":

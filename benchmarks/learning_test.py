@@ -11,7 +11,6 @@ Finished runs are kept and interrupted ones resumed: the same command goes on wh
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -22,6 +21,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from benchmarks.page_modules import ADD_A_METHOD, write_page_modules
+from benchmarks.rows import Row, markdown, read_rows, write_rows
 from bootifol.errors import BootifolError
 from bootifol.evaluation.returns import evaluate, scaled_return
 from bootifol.evaluation.summary import Summary, summarize
@@ -29,7 +29,7 @@ from bootifol.evaluation.tables import read_evaluations
 from bootifol.experts import make_random
 from bootifol.files import written_aside
 from bootifol.presets import preset
-from bootifol.reports.style import KIND_COLORS, RUN_COLORS, RUN_DASHES, house_style
+from bootifol.reports.style import KIND_COLORS, RUN_COLORS, RUN_DASHES, house_style, save_png
 from bootifol.rewards.registry import RewardConfig
 from bootifol.tasks import Task, task_named
 from bootifol.training.components import build_environment
@@ -73,7 +73,6 @@ METHODS: dict[str, tuple[str, Change]] = {
 """The `--method` of each, and what it changes of the preset's rewards; optimal_transport is docs/add_a_method.md's."""
 
 COLUMNS = ("method", "seed", "agent_steps", "seconds", "episodes", "mean_return", "scaled_return")
-Row = dict[str, str]
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -90,11 +89,19 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--runs", type=Path, required=True, help="where to keep the runs")
     parser.add_argument("--out", type=Path, default=Path("results/drawn_home/methods.csv"))
     arguments = parser.parse_args(words)
+    try:
+        compare(arguments)
+    except BootifolError as error:
+        sys.exit(f"error: {error}")
+
+
+def compare(arguments: argparse.Namespace) -> None:
+    """Trains what is missing, and writes rows, table and picture."""
     write_page_modules(ADD_A_METHOD, arguments.runs)
     sys.path.insert(0, str(arguments.runs.resolve()))
     config = _configuration(arguments.preset, arguments.agent_steps)
     console = Console()
-    rows = read_rows(arguments.out)
+    rows = read_rows(arguments.out, COLUMNS)
     done = {(row["method"], row["seed"]) for row in rows}
     for seed in arguments.seeds:
         for method in [*arguments.methods, *arguments.own]:
@@ -109,7 +116,7 @@ def main(words: Sequence[str] | None = None) -> None:
             else:
                 rows += trained_rows(described, method, directory)
             console.print(rows[-1])
-            write_rows(arguments.out, rows)
+            write_rows(arguments.out, COLUMNS, rows)
     task = task_named(arguments.task)
     shown = table(rows, task)
     with written_aside(arguments.out.with_suffix(".md")) as aside:
@@ -190,23 +197,6 @@ def row_of(
     return dict(zip(COLUMNS, values, strict=True))
 
 
-def read_rows(path: Path) -> list[Row]:
-    """The rows so far; none where there is no file yet."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def write_rows(path: Path, rows: Sequence[Row]) -> None:
-    """Writes all rows; the file is whole at any time."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with written_aside(path) as aside, aside.open("w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows(rows)
-
-
 def last_rows(rows: Sequence[Row], method: str) -> list[Row]:
     """The last evaluation of each seed."""
     by_seed: dict[str, Row] = {}
@@ -219,10 +209,11 @@ def last_rows(rows: Sequence[Row], method: str) -> list[Row]:
 
 def table(rows: Sequence[Row], task: Task) -> str:
     """Returns after training, means over seeds with 95 % bootstrap intervals over them, in Markdown."""
-    lines = [
-        "| method | seeds | agent steps | minutes | return | scaled return | 95 % interval | passed |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    header = (
+        *("method", "seeds", "agent steps", "minutes"),
+        *("return", "scaled return", "95 % interval", "passed"),
+    )
+    lines = []
     for method in dict.fromkeys(row["method"] for row in rows):
         last = last_rows(rows, method)
         scaled = summarize([float(row["scaled_return"]) for row in last])
@@ -241,8 +232,8 @@ def table(rows: Sequence[Row], task: Task) -> str:
             _interval(scaled),
             f"{passed} of {len(last)}",
         )
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+        lines.append(cells)
+    return markdown(header, lines) + "\n"
 
 
 def _interval(summary: Summary) -> str:
@@ -282,8 +273,7 @@ def draw_curves(rows: Sequence[Row], task: Task, path: Path) -> None:
             f"{task.name}: thick lines are means over seeds, thin ones seeds", loc="left", fontsize=9
         )
         axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
-        with written_aside(path) as aside:
-            figure.savefig(aside, format="png")
+    save_png(figure, path)
 
 
 if __name__ == "__main__":

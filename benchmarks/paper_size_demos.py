@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from benchmarks.process_memory import status_bytes
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.demos.record import record
@@ -60,14 +61,6 @@ class Reading:
     """Resident bytes when everything was imported."""
     peak: int
     """Resident bytes at most."""
-
-
-def status_bytes(name: str) -> int:
-    """A line of this process's /proc/self/status, such as VmHWM, in bytes."""
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith(f"{name}:"):
-            return int(line.split()[1]) * 1024
-    raise BootifolError(f"the system does not say how much memory a process has ({name}): run this on Linux")
 
 
 def read_within(directory: Path, memory: int, batch: int, gradient_steps: int) -> Reading:

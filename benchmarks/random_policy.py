@@ -16,6 +16,7 @@ import tyro
 
 from bootifol.cli.train import preset_of
 from bootifol.envs.rollout import Act
+from bootifol.errors import BootifolError
 from bootifol.evaluation.returns import EpisodeResult, evaluate, evaluation_rows
 from bootifol.evaluation.tables import append_evaluations
 from bootifol.experts import make_random
@@ -39,9 +40,9 @@ def play(
 ) -> None:
     """Plays the final evaluation of a run with random actions; `method` and `time_budget` change nothing."""
     run = RunConfig(task, "random", preset, seed, str(demos), None, config)
-    run.write(out, ["python", "-m", "benchmarks.random_policy", *sys.argv[1:]])
     resolved = run.resolved_task()
     environment = build_environment(run, resolved.evaluation_steps)
+    run.write(out, ["python", "-m", "benchmarks.random_policy", *sys.argv[1:]])
     act: Act = make_random(environment, seed)
     results: list[EpisodeResult] = []
     with progress("random actions", config.evaluation.final_episodes) as advance:
@@ -61,14 +62,20 @@ def play(
     report([out], out / "report.html")
 
 
-def main() -> None:
+def main() -> int:
+    """The command: 0, or 2 after bad input, which one sentence explains."""
     words = sys.argv[1:]
-    tyro.cli(
-        functools.partial(play, config=preset_of(words)),
-        args=words,
-        config=(tyro.conf.FlagConversionOff, tyro.conf.AvoidSubcommands),
-    )
+    try:
+        tyro.cli(
+            functools.partial(play, config=preset_of(words)),
+            args=words,
+            config=(tyro.conf.FlagConversionOff, tyro.conf.AvoidSubcommands),
+        )
+    except BootifolError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

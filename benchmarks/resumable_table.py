@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.table import Table
 
-from bootifol.errors import BootifolError
-from bootifol.files import written_aside
+from benchmarks.rows import Row, read_rows, write_rows
 
 
 class ResumableTable:
@@ -21,22 +19,14 @@ class ResumableTable:
         key: how many of them, the first, tell rows apart.
 
     Raises:
-        BootifolError: the file has other columns.
+        BootifolError: the file is another table.
     """
 
     def __init__(self, path: Path, columns: Sequence[str], key: int = 2) -> None:
         self.path = path
         self.columns = tuple(columns)
-        self.rows: list[dict[str, str]] = []
+        self.rows: list[Row] = read_rows(path, columns)
         self._key = key
-        if path.exists():
-            with path.open(newline="") as file:
-                reader = csv.DictReader(file)
-                self.rows = list(reader)
-            if tuple(reader.fieldnames or ()) != self.columns:
-                raise BootifolError(
-                    f"{path} is another table: its first line must be {','.join(columns)}; choose another --out"
-                )
 
     def has(self, *key: object) -> bool:
         """Whether a row begins with these values."""
@@ -46,11 +36,7 @@ class ResumableTable:
     def add(self, row: Mapping[str, str]) -> None:
         """Adds a row and writes the file."""
         self.rows.append({column: row[column] for column in self.columns})
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        with written_aside(self.path) as aside, aside.open("w", newline="") as file:
-            writer = csv.DictWriter(file, self.columns)
-            writer.writeheader()
-            writer.writerows(self.rows)
+        write_rows(self.path, self.columns, self.rows)
 
     def shown(self) -> Table:
         """For a terminal."""

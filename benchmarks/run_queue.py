@@ -25,9 +25,11 @@ from benchmarks.run_state import check_is_planned, error_file, log_file, run_sta
 from benchmarks.suites import RANDOM, VIDEOS, PlannedRun, tasks_of
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.errors import BootifolError
+from bootifol.files import written_aside
 from bootifol.progress import duration
 from bootifol.tasks import short_name
 from bootifol.training.budget import parse_duration
+from bootifol.training.config import TrainingConfig
 from bootifol.training.interruption import Interruption
 
 PROGRAM = (sys.executable, "-m", "bootifol")
@@ -169,11 +171,8 @@ class RunQueue:
         lock: int,
     ) -> str:
         """Records demo sets; the sentence of what went wrong, or nothing."""
-        pictures = run.config.pictures
-        words = ["demos", "record", "--task", run.task, "--out", str(directory)]
-        words += ["--episodes", str(self.videos or VIDEOS[run.preset]), "--workers", str(len(self._cores))]
-        words += ["--agent-size", str(pictures.agent_size), "--video-size", str(pictures.video_size)]
-        words += ["--profile", pictures.profile, "--behaviors", *behaviors]
+        videos, workers = self.videos or VIDEOS[run.preset], len(self._cores)
+        words = record_words(run.task, run.config, directory, videos, behaviors, workers)
         process, log_begins = self._start([*self.program, *words], log_file(directory), lock)
         stopping = False
         try:
@@ -250,8 +249,8 @@ class RunQueue:
 
     def _fail(self, run: PlannedRun, error: str, log: Path) -> None:
         directory = self.directory(run)
-        directory.parent.mkdir(parents=True, exist_ok=True)
-        error_file(directory).write_text(f"{error}\n")
+        with written_aside(error_file(directory)) as aside:
+            aside.write_text(f"{error}\n")
         self.say(f"{'failed':10} {run.name}: {error} (see {log})")
 
     def _time_left(self, waiting: Sequence[PlannedRun]) -> float | None:
@@ -303,6 +302,33 @@ def cores(workers: int) -> list[int | None]:
             f"compared on equal terms, so use --workers {len(usable)} at most"
         )
     return list(usable[:workers])
+
+
+def record_words(
+    task: str,
+    config: TrainingConfig,
+    directory: Path,
+    videos: int,
+    behaviors: Sequence[str],
+    workers: int = 1,
+) -> list[str]:
+    """The words after `bootifol` that record what runs of a configuration learn from.
+
+    Args:
+        task: what to perform.
+        config: of the runs, which decides how the videos must look and how long they are.
+        directory: of the demo sets.
+        videos: of each behavior.
+        behaviors: who performs.
+        workers: processes that record.
+    """
+    pictures = config.pictures
+    words = ["demos", "record", "--task", task, "--out", str(directory)]
+    words += ["--episodes", str(videos), "--workers", str(workers)]
+    for name, length in (("episode-steps", config.episode_steps), ("action-repeat", config.action_repeat)):
+        words += [] if length is None else [f"--{name}", str(length)]
+    words += ["--agent-size", str(pictures.agent_size), "--video-size", str(pictures.video_size)]
+    return [*words, "--profile", pictures.profile, "--behaviors", *behaviors]
 
 
 def missing_demos(directory: Path) -> list[str]:

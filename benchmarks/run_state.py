@@ -12,6 +12,8 @@ from benchmarks.suites import RANDOM, PlannedRun
 from bootifol.errors import BootifolError
 from bootifol.files import read_json
 from bootifol.progress import duration
+from bootifol.reports.comparison import unfinished_because
+from bootifol.reports.run_files import read_run
 
 State = Literal["not begun", "begun", "done", "failed"]
 
@@ -57,10 +59,13 @@ def error_file(directory: Path) -> Path:
 
 
 def run_state(directory: Path) -> RunState:
-    """The state of the run in a directory; its report is the last thing a run writes."""
+    """The state of the run in a directory.
+
+    Its report is the last thing a run writes; but `bootifol report` writes one of a run in progress, too.
+    """
     error = error_file(directory)
     state: State = "not begun"
-    if (directory / "report.html").is_file():
+    if (directory / "report.html").is_file() and unfinished_because(read_run(directory)) is None:
         state = "done"
     elif error.is_file():
         state = "failed"

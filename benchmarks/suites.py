@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from bootifol.errors import BootifolError
 from bootifol.presets import PAPER, preset
+from bootifol.reports.paper_results import RETURNS
 from bootifol.tasks import short_name, task_named
 from bootifol.training.config import TrainingConfig
 
@@ -223,15 +224,7 @@ class Suite:
         return runs
 
 
-SEVEN_TASKS = (
-    "reacher_hard",
-    "finger_turn_easy",
-    "hopper_stand",
-    "walker_run",
-    "button_press",
-    "plate_slide",
-    "drawer_close",
-)
+SEVEN_TASKS = tuple(RETURNS)
 FIVE_SEEDS = (1, 2, 3, 4, 5)
 THREE_SEEDS = (1, 2, 3)
 _ablation = partial(Suite, preset="cpu", tasks=("reacher_hard",), seeds=THREE_SEEDS)
@@ -269,8 +262,9 @@ SUITES = {
     "smoke": Suite("three runs of seconds, which learn nothing", "smoke", ("drawn_home",), (1,), smallest),
 }
 
-VIDEOS = {"paper": 5032, "cpu": 1000, "demo": 700, "drawn": 150, "smoke": 12}
-"""Expert videos to record for each preset. The paper learns from 5000; up to 32 are held out to see how they rank."""
+VIDEOS = {"paper": 5032, "cpu": 1000, "demo": 700, "drawn": 150, "smoke": 12, "backbone": 1532}
+"""Expert videos to record for each preset. The paper learns from 5000, with a backbone from 1500; up to 32 are held
+out to see how they rank."""
 
 
 def named(name: str) -> Suite:

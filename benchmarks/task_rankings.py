@@ -27,7 +27,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from benchmarks.rows import Row, markdown, read_rows, write_rows
-from benchmarks.task_returns import PAPER
 from bootifol.demos.record import HALF_GOOD_VIDEOS, record_demos
 from bootifol.errors import BootifolError, require_at_least
 from bootifol.evaluation.ranking import (
@@ -40,11 +39,11 @@ from bootifol.evaluation.ranking import (
     ranking_scores,
 )
 from bootifol.evaluation.tables import RankingRow
-from bootifol.files import written_aside
 from bootifol.memory import keep_freed_memory
 from bootifol.presets import preset
 from bootifol.progress import progress
-from bootifol.reports.style import KIND_COLORS, KIND_NAMES, house_style
+from bootifol.reports.paper_results import RETURNS
+from bootifol.reports.style import KIND_COLORS, KIND_NAMES, house_style, save_png
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.tasks import TASKS, Task
 from bootifol.types import Video
@@ -200,8 +199,7 @@ def draw(rewards: dict[str, list[RankingRow]], rows: Sequence[Row], path: Path) 
         draw_areas(panels[len(rewards)], rows)
         for axes in panels[len(rewards) + 1 :]:
             axes.set_axis_off()
-        with written_aside(path) as aside:
-            figure.savefig(aside, format="png")
+    save_png(figure, path)
 
 
 def draw_task(axes: Axes, rewards: Sequence[RankingRow], row: Row) -> None:
@@ -251,7 +249,7 @@ def main(words: Sequence[str] | None = None) -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--tasks", nargs="+", default=list(PAPER), choices=list(TASKS), help="the seven by default"
+        "--tasks", nargs="+", default=list(RETURNS), choices=list(TASKS), help="the seven by default"
     )
     parser.add_argument("--preset", default="cpu", help="whose pictures and reward model")
     parser.add_argument("--gradient-steps", type=int, help="of each alignment; the preset's by default")

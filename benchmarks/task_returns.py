@@ -18,7 +18,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -29,27 +28,9 @@ from bootifol.evaluation.returns import EpisodeResult, behavior_results, unseen_
 from bootifol.evaluation.summary import summarize
 from bootifol.experts import Behavior
 from bootifol.progress import progress
+from bootifol.reports.paper_results import RETURNS
+from bootifol.reports.result_tables import ENDS
 from bootifol.tasks import TASKS, Task
-
-
-@dataclass(frozen=True)
-class PaperReturns:
-    """Means and standard deviations of a task in the paper's tables of absolute returns."""
-
-    expert: tuple[float, float]
-    random: tuple[float, float]
-
-
-PAPER = {
-    "reacher_hard": PaperReturns((850.52, 315.70), (6.64, 16.94)),
-    "finger_turn_easy": PaperReturns((893.44, 219.75), (92.6, 202.68)),
-    "hopper_stand": PaperReturns((880.93, 76.89), (2.44, 5.19)),
-    "walker_run": PaperReturns((789.77, 17.25), (29.93, 4.52)),
-    "button_press": PaperReturns((556.06, 6.46), (153.29, 51.68)),
-    "plate_slide": PaperReturns((734.56, 172.51), (209.12, 87.38)),
-    "drawer_close": PaperReturns((4223.65, 21.14), (409.07, 1288.89)),
-}
-"""The paper's tasks, in its order."""
 
 META_WORLD_LIMIT = 500
 """Meta-World's own time limit, in simulator steps."""
@@ -150,11 +131,11 @@ def report(tasks: Sequence[Task], rows: Sequence[Row]) -> str:
             behavior: found.get((task.name, behavior, str(task.evaluation_steps)))
             for behavior in ("expert", "half_good", "random")
         }
-        name, paper = f"`{task.name}`", PAPER.get(task.name)
+        name, paper = f"`{task.name}`", RETURNS.get(task.name)
         there = (
             ("–", "–")
             if paper is None
-            else (f"{mean:.2f} ± {std:.2f}" for mean, std in (paper.expert, paper.random))
+            else (f"{paper[who].absolute:.2f} ± {paper[who].deviation:.2f}" for who in ENDS)
         )
         returns.append([name, *(with_interval(row) for row in of_task.values()), *there])
         short = found.get((task.name, "expert", str(task.episode_steps)))
@@ -191,7 +172,7 @@ def main(words: Sequence[str] | None = None) -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--tasks", nargs="+", default=list(PAPER), choices=list(TASKS), help="the seven by default"
+        "--tasks", nargs="+", default=list(RETURNS), choices=list(TASKS), help="the seven by default"
     )
     parser.add_argument("--episodes", type=int, default=50)
     parser.add_argument("--out", type=Path, default=Path("results/tasks/returns.csv"))

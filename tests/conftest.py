@@ -7,6 +7,11 @@ from bootifol.errors import BootifolError
 from bootifol.tasks import make_environment
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The slow tests first: begun last, they would keep one worker busy while the other has nothing left to do."""
+    items.sort(key=lambda item: "end_to_end" not in item.path.parts)
+
+
 @pytest.fixture(scope="session")
 def requires_rendering() -> None:
     """Skips where OpenGL is missing; a machine that can render runs every test."""

@@ -185,6 +185,7 @@ def test_without_its_module_a_run_says_so_in_a_sentence(
     said = capsys.readouterr().err
     assert f"there is no module optimal_transport for {METHOD}, neither in {tmp_path}" in said
     assert "Traceback" not in said
+    assert bootifol.evaluate(run, episodes=1).episode_steps == 60, "a policy acts without its reward"
 
 
 BROKEN = """

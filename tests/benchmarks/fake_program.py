@@ -14,6 +14,9 @@ import sys
 import time
 from pathlib import Path
 
+# Written out, since importing the library would take longer than all else here.
+COLUMNS = "agent_steps,seconds,episode_steps,episode,seed,environment_return,scaled_return,success"
+
 
 def main(words: list[str]) -> int:
     values = dict(itertools.pairwise(words))
@@ -34,17 +37,28 @@ def main(words: list[str]) -> int:
     out.mkdir(parents=True, exist_ok=True)
     if not resumes:
         header = {name: values[f"--{name}"] for name in ("task", "method", "preset")}
-        config = {"seed": int(values["--seed"]), "time_budget": None, "config": {}}
-        (out / "config.json").write_text(json.dumps(header | config))
+        write_config(out, header | {"seed": int(values["--seed"])})
     method = json.loads((out / "config.json").read_text())["method"]
     if method == "gaifo":
         print("a line before\nerror: the loss is nan\n", file=sys.stderr)
         return 2
     if method == "virl" and not resumes:
         return interrupted_twice() if os.environ.get("FAKE_CTRL_C") == "twice" else interrupted_once(out)
-    (out / "metrics.jsonl").write_text('{"phase": "interactive", "agent_steps": 240, "seconds": 12.5}\n')
-    (out / "report.html").write_text("a report")
+    write_end(out, 12.5)
     return 0
+
+
+def write_config(out: Path, header: dict[str, object]) -> None:
+    config = {"interactive": {"agent_steps": 240}, "evaluation": {"final_episodes": 1}}
+    (out / "config.json").write_text(json.dumps(header | {"time_budget": None, "config": config}))
+
+
+def write_end(out: Path, seconds: float) -> None:
+    """What a run that has ended leaves."""
+    line = {"phase": "interactive", "agent_steps": 240, "seconds": seconds}
+    (out / "metrics.jsonl").write_text(json.dumps(line) + "\n")
+    (out / "evaluations.csv").write_text(f"{COLUMNS}\n240,{seconds},60,0,7,50.0,1.0,True\n")
+    (out / "report.html").write_text("a report")
 
 
 def note(line: str) -> None:

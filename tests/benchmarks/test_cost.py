@@ -48,7 +48,8 @@ def test_only_what_is_missing_is_measured(
 
     def run(command: list[str], **_: object) -> subprocess.CompletedProcess[str]:
         measured.append(command[-1])
-        row = ROW | {"task": "drawn_home", "preset": "smoke", "system": command[-1]}
+        threads = command[command.index("--threads") + 1]
+        row = ROW | {"task": "drawn_home", "preset": "smoke", "system": command[-1], "threads": threads}
         code = 2 if measured.count("virl") == 1 and command[-1] == "virl" else 0
         return subprocess.CompletedProcess(command, code, stdout=f"a line\n{json.dumps(row)}\n")
 
@@ -68,8 +69,10 @@ def test_only_what_is_missing_is_measured(
         cost.compare(arguments)
     cost.compare(arguments)
     assert measured == ["gaifo", "virl", "virl", "environment"]
+    cost.compare(Namespace(**vars(arguments) | {"systems": ["gaifo"], "threads": 2}))
+    assert measured[4:] == ["gaifo"], "two threads are another measurement"
     table = (tmp_path / "cost.md").read_text().splitlines()
-    assert table[0].startswith("| task | preset | system | threads |") and len(table) == 2 + 3
+    assert table[0].startswith("| task | preset | system | threads |") and len(table) == 2 + 4
 
 
 def test_an_unknown_system_is_named() -> None:

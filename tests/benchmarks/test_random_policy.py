@@ -24,3 +24,13 @@ def test_a_random_policy_leaves_what_tables_read(tmp_path: Path, monkeypatch: py
     assert (run.task, run.method, run.seed) == ("drawn_home", "random", 3)
     assert len(run.evaluations) == 2
     assert all(row.scaled_return is not None and row.scaled_return < 0.5 for row in run.evaluations)
+
+
+def test_bad_input_gets_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--task", "reacher_harder", "--demos", "demos", "--out", str(tmp_path / "run")]
+    monkeypatch.setattr(sys, "argv", ["random_policy", *words])
+    assert main() == 2
+    assert "error: there is no task 'reacher_harder'" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()

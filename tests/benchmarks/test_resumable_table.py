@@ -36,5 +36,5 @@ def test_a_row_that_lacks_a_column_is_not_written(tmp_path: Path) -> None:
 
 def test_another_table_is_refused(tmp_path: Path) -> None:
     (tmp_path / "table.csv").write_text("task,seconds\nreacher_hard,3\n")
-    with pytest.raises(BootifolError, match="its first line must be variant,seed,mean_return"):
+    with pytest.raises(BootifolError, match="its first line should be variant,seed,mean_return"):
         ResumableTable(tmp_path / "table.csv", COLUMNS)

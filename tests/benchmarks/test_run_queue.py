@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import fcntl
+import itertools
 import json
 import os
 import sys
 from pathlib import Path
 
 import pytest
-from benchmarks.run_queue import RunQueue, cores, missing_demos, what_went_wrong
+from benchmarks.run_queue import RunQueue, cores, missing_demos, record_words, what_went_wrong
 from benchmarks.run_state import run_state
 from benchmarks.suites import PlannedRun, System
+from fake_program import write_config, write_end
 
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
+from bootifol.presets import BACKBONE, CPU
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_program.py")))
 
@@ -122,6 +125,13 @@ def test_as_many_videos_are_recorded_as_wanted(suite: Path) -> None:
     assert recorded == ["record drawn_home 12 at 64", "record drawn_home 7 at 64"]
 
 
+def test_videos_are_as_long_as_the_runs_want_them() -> None:
+    words = record_words("reacher_hard", BACKBONE, Path("demos"), 3, ["expert"])
+    options = dict(itertools.pairwise(words))
+    assert (options["--episode-steps"], options["--video-size"], options["--episodes"]) == ("50", "224", "3")
+    assert "--episode-steps" not in record_words("reacher_hard", CPU, Path("demos"), 3, ["expert"])
+
+
 def test_imported_videos_are_used_and_random_ones_recorded_beside_them(suite: Path, demo_set: Path) -> None:
     (suite / "mine").mkdir()
     assert missing_demos(suite / "mine") == ["expert", "random", "half_good"]
@@ -171,8 +181,10 @@ def test_the_time_left_is_that_of_runs_alike(suite: Path) -> None:
     for run, seconds in zip(runs, (100, 40, 30, 0), strict=True):
         directory = waiting.directory(run)
         directory.mkdir(parents=True)
-        record_line = {"phase": "interactive", "agent_steps": 10, "seconds": seconds}
-        (directory / "metrics.jsonl").write_text(json.dumps(record_line) + "\n")
         if run.seed == 1:
-            (directory / "report.html").touch()
+            write_config(directory, {"task": run.task, "method": run.system.method})
+            write_end(directory, seconds)
+        else:
+            record_line = {"phase": "interactive", "agent_steps": 10, "seconds": seconds}
+            (directory / "metrics.jsonl").write_text(json.dumps(record_line) + "\n")
     assert waiting._time_left(runs[2:]) == (100 - 30) + 40

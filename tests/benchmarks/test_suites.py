@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 import tyro
 from benchmarks.suite import main
-from benchmarks.suites import SUITES, PlannedRun, equivalent_steps, tasks_of, with_overrides
+from benchmarks.suites import SUITES, VIDEOS, PlannedRun, equivalent_steps, tasks_of, with_overrides
+from fake_program import write_config, write_end
 
 from bootifol.errors import BootifolError
-from bootifol.presets import CPU, PAPER, SMOKE
+from bootifol.presets import CPU, PAPER, PRESETS, SMOKE
 from bootifol.training.config import TrainingConfig
 
 
@@ -65,6 +66,10 @@ def test_overrides_of_one_section_are_set_together() -> None:
         with_overrides(CPU, (("reward.bootifol.reward", "cosine"),))
 
 
+def test_every_preset_says_how_many_videos_its_runs_want() -> None:
+    assert VIDEOS.keys() == PRESETS.keys()
+
+
 def test_a_suite_takes_another_preset_and_other_tasks() -> None:
     runs = SUITES["alignment"].runs("drawn", ["drawn_home"], [7])
     assert [run.name for run in runs] == [
@@ -80,13 +85,14 @@ def test_a_suite_takes_another_preset_and_other_tasks() -> None:
 def test_list_prints_runs_and_runs_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = tmp_path / "reacher_hard" / "virl" / "seed1"
     run.mkdir(parents=True)
-    (run / "report.html").touch()
+    write_config(run, {"task": "reacher_hard", "method": "virl"})
+    write_end(run, 9.0)
     begin_nothing = functools.partial(main, program=("no such program",))
     assert (
         begin_nothing(["reacher", "--out", str(tmp_path), "--only", "*/virl/*", "*/gaifo/*", "--list"]) == 0
     )
     virl, gaifo = capsys.readouterr().out.splitlines()
-    assert virl.split() == ["reacher_hard/virl/seed1", "done:", "0", "agent", "steps,", "0", "s"]
+    assert virl.split() == ["reacher_hard/virl/seed1", "done:", "240", "agent", "steps,", "9", "s"]
     assert gaifo.split() == ["reacher_hard/gaifo/seed1", "not", "begun"]
 
 

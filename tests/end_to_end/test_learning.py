@@ -1,7 +1,6 @@
 """That learning happens at all, on a small task drawn with numpy: videos of a script in, no simulator.
 
-First the reward alone: it prefers what the videos show, whoever they show. Then the whole method, both phases, to a
-return that a random policy, a shuffled reward or a frozen agent cannot reach.
+The whole method, both phases, to a return that a random policy, a shuffled reward or a frozen agent cannot reach.
 """
 
 from __future__ import annotations
@@ -14,10 +13,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.record import record_demos
 from bootifol.envs.rollout import Act
-from bootifol.evaluation.ranking import area_under_curve, rank_videos
 from bootifol.evaluation.returns import evaluate
 from bootifol.experts import make_random
 from bootifol.presets import DRAWN
@@ -37,26 +34,6 @@ def demos(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("learning") / "demos"
     record_demos(TASK, directory, episodes=120, pictures=PICTURES)
     return directory
-
-
-@pytest.mark.parametrize(("shown", "other"), [("expert", "random"), ("random", "expert")])
-def test_the_learned_reward_prefers_what_the_videos_show(tmp_path: Path, shown: str, other: str) -> None:
-    """Whoever the videos show: with the roles swapped, a reward that merely likes calm pictures must fail."""
-    # The target is drawn anew for each video: one fixed place would be told apart without learning.
-    record_demos("drawn_reach", tmp_path, episodes=120, behaviors=("expert", "random"), pictures=PICTURES)
-    sources, unseen = {}, {}
-    for kind in (shown, other):
-        sources[kind], aside = DemoSet.open(tmp_path / kind).split(24)
-        unseen[kind] = [aside[index] for index in range(len(aside))]
-    model = BootifolRewardModel(CONFIG.reward.bootifol, PICTURES.video_size, seed=1)
-    steps = model.align(sources[shown], sources[other])
-    for _ in range(120):
-        next(steps)
-    rows = rank_videos(model, unseen, sources[shown], np.random.default_rng(0), agent_steps=0)
-    rewards = {kind: np.array([row.reward for row in rows if row.kind == kind]) for kind in unseen}
-    preferred = area_under_curve(rewards[shown], rewards[other])
-    print(f"AUC {shown} above {other}: {preferred:.2f}")
-    assert preferred > 0.8
 
 
 class ShuffledReward(BootifolRewardModel):

@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from benchmarks.rows import Row, read_rows
 
 from benchmarks import learning_test
 from bootifol.demos.record import record_demos
 from bootifol.envs.pictures import PictureConfig
-from bootifol.errors import BootifolError
 from bootifol.presets import DRAWN
 from bootifol.rewards.registry import METHODS, RewardConfig, check_method
 from bootifol.tasks import task_named
@@ -19,7 +19,7 @@ from bootifol.tasks import task_named
 TASK = task_named("drawn_home")
 
 
-def row(method: str, seed: int, agent_steps: int, environment_return: float) -> learning_test.Row:
+def row(method: str, seed: int, agent_steps: int, environment_return: float) -> Row:
     return learning_test.row_of(TASK, method, seed, agent_steps, 60.0, [environment_return])
 
 
@@ -61,7 +61,7 @@ def test_it_trains_evaluates_and_goes_on_where_it_stopped(
     ]
     tiny = [*words, "--agent-steps", "60", "--seeds", "1", "--methods", "virl", "random"]
     learning_test.main(tiny)
-    rows = learning_test.read_rows(tmp_path / "m.csv")
+    rows = read_rows(tmp_path / "m.csv", learning_test.COLUMNS)
     assert [(each["method"], each["agent_steps"], each["episodes"]) for each in rows] == [
         ("virl", "60", "8"),
         ("random", "0", "8"),
@@ -73,6 +73,6 @@ def test_it_trains_evaluates_and_goes_on_where_it_stopped(
 
     monkeypatch.delattr(learning_test, "Run")  # what is done is not done again
     learning_test.main(tiny)
-    assert learning_test.read_rows(tmp_path / "m.csv") == rows
-    with pytest.raises(BootifolError, match="virl-seed1 holds another run"):
+    assert read_rows(tmp_path / "m.csv", learning_test.COLUMNS) == rows
+    with pytest.raises(SystemExit, match=r"error: .*virl-seed1 holds another run"):
         learning_test.main([*words, "--agent-steps", "90", "--seeds", "1", "--methods", "virl"])

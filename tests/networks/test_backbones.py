@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -164,6 +165,18 @@ def test_pickled_weights_are_refused(tmp_path: Path) -> None:
     torch.save(model.state_dict(), tmp_path / "pytorch_model.bin")
     with pytest.raises(BootifolError, match=r"cannot be loaded .* has its weights as safetensors"):
         load_backbone(str(tmp_path), SIZE)
+
+
+def test_code_that_comes_with_weights_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = {"model_type": "theirs", "auto_map": {"AutoConfig": "code_of_theirs.Config"}}
+    (tmp_path / "config.json").write_text(json.dumps(config))
+    (tmp_path / "code_of_theirs.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n")
+    asked: list[object] = []
+    monkeypatch.setattr("builtins.input", lambda *prompt: asked.append(prompt) or "n")
+    with pytest.raises(BootifolError, match=r"cannot be loaded .* contains custom code"):
+        load_transformers_model(str(tmp_path))
+    assert not asked, "nobody sits in front of a queue"
+    assert not (tmp_path / "ran").exists()
 
 
 def test_what_is_no_backbone_is_refused_with_a_sentence(tmp_path: Path) -> None:

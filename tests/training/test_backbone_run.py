@@ -49,13 +49,18 @@ def own_demos(demos: Path, tmp_path: Path) -> Path:
 FRAMES = 31
 VIDEOS = 12 + 12 + 2
 """Of expert and random videos all are read, of half-good ones those that are held out."""
-EPISODES = 240 // 30
+EPISODES = 4
+
+
+def lasting(episodes: int, config: TrainingConfig) -> TrainingConfig:
+    return replace(config, interactive=replace(config.interactive, agent_steps=episodes * (FRAMES - 1)))
 
 
 def test_videos_to_report_with_every_frame_read_once(
     own_demos: Path, tmp_path: Path, tiny_backbone: str, counted: list[bytes]
 ) -> None:
-    run = new_run(tmp_path / "run", own_demos, config=with_backbone(TINY, tiny_backbone))
+    config = lasting(EPISODES, with_backbone(TINY, tiny_backbone))
+    run = new_run(tmp_path / "run", own_demos, config=config)
     assert len(counted) == VIDEOS * FRAMES
     assert run.learn()
     assert len(counted) == (VIDEOS + EPISODES) * FRAMES
@@ -85,7 +90,7 @@ def test_another_run_finds_the_features_of_the_videos(
 def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
     demos: Path, tmp_path: Path, tiny_backbone: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    config = with_backbone(WITH_DEMONSTRATIONS, tiny_backbone)
+    config = lasting(6, with_backbone(WITH_DEMONSTRATIONS, tiny_backbone))
     whole = new_run(tmp_path / "whole", demos, config=config)
     assert whole.learn()
     play = InteractivePhase.play_episode

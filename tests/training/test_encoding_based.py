@@ -19,12 +19,19 @@ from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 from bootifol.types import Video
 
+SHORT = replace(
+    ENCODING_BASED,
+    interactive=replace(ENCODING_BASED.interactive, agent_steps=90),
+    evaluation=replace(ENCODING_BASED.evaluation, showcase_episodes=0),
+)
+"""A warm-up, a Cloning Phase, and an episode in which reward and agent learn."""
+
 
 def test_a_finished_run_is_evaluated_with_its_own_encoder(tmp_path: Path, demos: Path) -> None:
-    run = new_run(tmp_path / "run", demos, config=ENCODING_BASED)
+    run = new_run(tmp_path / "run", demos, config=SHORT)
     assert run.learn()
     scores = run.finish()
-    again = evaluate_run(tmp_path / "run", ENCODING_BASED.evaluation.final_episodes, seed=run.run.seed)
+    again = evaluate_run(tmp_path / "run", SHORT.evaluation.final_episodes, seed=run.run.seed)
     assert again.summary.mean == scores["evaluation/return_60"]
 
 
@@ -67,7 +74,7 @@ def test_encodings_of_a_backbone_are_refused(demos: Path, tiny_backbone: str) ->
 
 
 def test_without_an_alignment_phase_the_reward_is_still_finite(tmp_path: Path, demos: Path) -> None:
-    config = replace(ENCODING_BASED, alignment=replace(ENCODING_BASED.alignment, gradient_steps=0))
+    config = replace(SHORT, alignment=replace(SHORT.alignment, gradient_steps=0))
     run = Run(
         RunConfig("drawn_reach", "bootifol", "smoke", 1, str(demos), None, config),
         tmp_path / "run",

@@ -12,6 +12,7 @@ from tiny_runs import RUNS, WITH_DEMONSTRATIONS, new_run, resumed
 
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.errors import BootifolError
+from bootifol.evaluation.tables import EvaluationRow, RankingRow, append_evaluations, append_ranking
 from bootifol.files import read_arrays, read_json
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.config import TrainingConfig
@@ -130,25 +131,34 @@ def test_ctrl_c_during_alignment_can_be_resumed(
     assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
 
 
-def test_metrics_written_after_the_checkpoint_are_undone(
+def test_what_was_measured_after_the_checkpoint_is_undone_once_the_run_goes_on(
     tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    signal_at(monkeypatch, signal.SIGTERM, episode=3)
+    signal_at(monkeypatch, signal.SIGTERM, episode=4)
     assert not new_run(tmp_path / "run", demos).learn()
-    metrics = tmp_path / "run" / "metrics.jsonl"
-    written = metrics.read_text()
-    with metrics.open("a") as file:
+    files = [tmp_path / "run" / name for name in ("metrics.jsonl", "evaluations.csv", "ranking.csv")]
+    written = [file.read_text() for file in files]
+    with files[0].open("a") as file:
         file.write('{"phase": "interactive", "agent_steps": 99999}\n')
-    resumed(tmp_path / "run")
-    assert metrics.read_text() == written
+    # With a time budget a run may end before the moments that it had come to in its last session.
+    append_evaluations(files[1], [EvaluationRow(99999, 9.0, 60, 0, 7, 1.0, 1.0, True)])
+    append_ranking(files[2], [RankingRow(99999, "expert", "a", 1.0)])
+    there = [file.read_text() for file in files]
+    rest = resumed(tmp_path / "run")
+    assert [file.read_text() for file in files] == there, "looking at a run changes nothing"
+    monkeypatch.setattr(Run, "_align", lambda *_: False)
+    rest.learn()
+    assert [file.read_text() for file in files] == written
+    assert "120" in written[1] and written[2].count("\n") > 1
 
 
 def test_metrics_of_a_run_that_died_before_its_first_checkpoint_are_undone(
-    tmp_path: Path, demos: Path
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     new_run(tmp_path / "run", demos)
     (tmp_path / "run" / "metrics.jsonl").write_text('{"phase": "alignment", "gradient_step": 2}\n')
-    resumed(tmp_path / "run")
+    monkeypatch.setattr(Run, "_align", lambda *_: False)
+    resumed(tmp_path / "run").learn()
     assert (tmp_path / "run" / "metrics.jsonl").read_text() == ""
 
 

@@ -90,6 +90,15 @@ def append_ranking(path: Path, rows: Sequence[RankingRow]) -> None:
     _write(path, RankingRow, [*kept, *rows])
 
 
+def drop_later_rows(run_dir: Path, agent_steps: int) -> None:
+    """Removes what `evaluations.csv` and `ranking.csv` measured after so many agent steps.
+
+    A run that goes on from a checkpoint may never come to those moments again: with a time budget it ends elsewhere.
+    """
+    _drop_later_rows(run_dir / "evaluations.csv", EvaluationRow, agent_steps)
+    _drop_later_rows(run_dir / "ranking.csv", RankingRow, agent_steps)
+
+
 def read_evaluations(path: Path) -> Table[EvaluationRow]:
     """Reads `evaluations.csv`.
 
@@ -106,6 +115,13 @@ def read_ranking(path: Path) -> Table[RankingRow]:
         BootifolError: the file is missing, or its columns are not those of `RankingRow`.
     """
     return _read(path, RankingRow)
+
+
+def _drop_later_rows(path: Path, row_type: type[Row], agent_steps: int) -> None:
+    rows = _rows_so_far(path, row_type)
+    kept = [row for row in rows if row.agent_steps <= agent_steps]
+    if len(kept) < len(rows):
+        _write(path, row_type, kept)
 
 
 def _rows_so_far(path: Path, row_type: type[Row]) -> list[Row]:

@@ -1,7 +1,7 @@
 """Any pretrained vision model of the `transformers` library, as a network from pictures to one vector each.
 
-Weights are read from safetensors files alone. The library's image processors are not used (they want torchvision):
-videos have their size already, and `Normalization` does the rest.
+Weights are read from safetensors files alone, and code that comes with them is not run. The library's image processors
+are not used (they want torchvision): videos have their size already, and `Normalization` does the rest.
 """
 
 from __future__ import annotations
@@ -70,7 +70,9 @@ def load_transformers_model(name: str) -> tuple[PooledOutput, Normalization]:
         ) from None
     try:
         with _quiet(), torch.random.fork_rng(devices=[]):
-            model, loaded = AutoModel.from_pretrained(name, use_safetensors=True, output_loading_info=True)
+            model, loaded = AutoModel.from_pretrained(
+                name, use_safetensors=True, trust_remote_code=False, output_loading_info=True
+            )
     # The hub's client raises errors of its own beside OSError, a file that is no model many kinds.
     except Exception as error:
         raise BootifolError(

@@ -104,6 +104,9 @@ META_WORLD = PaperTable(
 
 TABLES = (DM_CONTROL, META_WORLD)
 
+RETURNS = {task: returns for table in TABLES for task, returns in table.tasks.items()}
+"""Returns by agent, of all seven tasks."""
+
 REMARKS = {
     "drawer_close": "The paper's two tables disagree on Drawer Close: its absolute returns scale to 0.93 "
     "(Eff-BootIfOL) and 0.64 (BootIfOL), not to the printed 0.91 and 0.53."

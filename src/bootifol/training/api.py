@@ -29,6 +29,7 @@ from bootifol.training.components import (
     build_reward_model,
     open_demos,
     reference_rng,
+    sees_encodings,
 )
 from bootifol.training.config import TrainingConfig
 from bootifol.training.interactive import evaluation_seeds
@@ -117,10 +118,13 @@ def evaluate_run(directory: Path | str, episodes: int = 10, seed: int = 1000) ->
     run = RunConfig.read(Path(directory))
     task = run.resolved_task()
     environment = build_environment(run, task.evaluation_steps)
-    reward_model = build_reward_model(run)
+    checkpoint = _newest(Path(directory))
+    # Others act without it, so a backbone or a module of one's own may be missing.
+    reward_model = build_reward_model(run) if sees_encodings(run) else None
+    if reward_model is not None:
+        load_checkpoint(checkpoint, {"reward_model": reward_model})
     agent = build_agent(run, environment, reward_model)
-    # Some agents see through the reward model.
-    load_checkpoint(_newest(Path(directory)), {"reward_model": reward_model, "agent": agent})
+    load_checkpoint(checkpoint, {"agent": agent})
     results = evaluate_act(
         environment,
         lambda observation: agent.act(observation, run.training.interactive.agent_steps, explore=False),

@@ -84,13 +84,15 @@ def build_backbone(run: RunConfig) -> Backbone | None:
     return make_backbone(run.method, run.training.reward, run.training.pictures.video_size)
 
 
-def build_agent(run: RunConfig, environment: gymnasium.Env[Any, Any], reward_model: RewardModel) -> DrQv2:
-    """The agent, untrained. The reward model is the run's; an encoding-based agent sees through it.
+def build_agent(
+    run: RunConfig, environment: gymnasium.Env[Any, Any], reward_model: RewardModel | None
+) -> DrQv2:
+    """The agent, untrained. The reward model is the run's; only one that `sees_encodings` needs it.
 
     Raises:
         BootifolError: the agent shall act on encodings, and the reward model has none for its pictures.
     """
-    encodings = _encodings(run, reward_model) if _sees_encodings(run) else None
+    encodings = _encodings(run, reward_model) if sees_encodings(run) else None
     assert isinstance(environment.action_space, gymnasium.spaces.Box)
     pictures = run.training.pictures
     return DrQv2(
@@ -103,11 +105,12 @@ def build_agent(run: RunConfig, environment: gymnasium.Env[Any, Any], reward_mod
     )
 
 
-def _sees_encodings(run: RunConfig) -> bool:
+def sees_encodings(run: RunConfig) -> bool:
+    """Whether the agent acts on the reward model's encodings instead of pictures."""
     return run.training.agent.observations == "encodings"
 
 
-def _encodings(run: RunConfig, reward_model: RewardModel) -> FrameEncodings:
+def _encodings(run: RunConfig, reward_model: RewardModel | None) -> FrameEncodings:
     pictures = run.training.pictures
     if not isinstance(reward_model, EncodesFrames):
         raise BootifolError(
@@ -129,7 +132,7 @@ def _encodings(run: RunConfig, reward_model: RewardModel) -> FrameEncodings:
 
 def _shift(run: RunConfig) -> int:
     """Of the pictures that replay gives out; encodings are of whole pictures."""
-    return 0 if _sees_encodings(run) else run.training.agent.shift
+    return 0 if sees_encodings(run) else run.training.agent.shift
 
 
 def demonstrated_videos(run: RunConfig, expert: VideoSource) -> int:

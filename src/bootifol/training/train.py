@@ -24,7 +24,7 @@ from bootifol.evaluation.ranking import (
 from bootifol.evaluation.returns import evaluate, evaluation_rows
 from bootifol.evaluation.showcase import play_showcase, write_showcase
 from bootifol.evaluation.summary import summarize
-from bootifol.evaluation.tables import append_evaluations, append_ranking
+from bootifol.evaluation.tables import append_evaluations, append_ranking, drop_later_rows
 from bootifol.experts import make_expert, make_random
 from bootifol.memory import keep_freed_memory
 from bootifol.progress import progress
@@ -73,6 +73,7 @@ class Run:
         self.components = build_components(self.run, self.environment, self.demos.expert, self.console)
         self.counters = Counters()
         self.rng = np.random.default_rng([self.run.seed, 3])
+        self._metrics_bytes = 0
         self._resume()
         self.budget = Budget(
             config.interactive.agent_steps,
@@ -104,6 +105,7 @@ class Run:
         Returns:
             True when the run has ended; False when it was asked to stop and can be resumed.
         """
+        self._undo_what_followed_the_checkpoint()
         self.tracker = Tracker(self.directory, self.run.training.tensorboard)
         with Interruption() as interruption:
             try:
@@ -335,31 +337,33 @@ class Run:
     def _resume(self) -> None:
         checkpoint = newest_checkpoint(self.directory / "checkpoints")
         if checkpoint is None:
-            self._undo_metrics_after(0)
             return
         saved = load_checkpoint(checkpoint, self.components.stateful())
         self.counters = saved.counters
         self.rng = restore_generator(saved.random_state)
-        self._undo_metrics_after(saved.metrics_bytes)
+        self._metrics_bytes = saved.metrics_bytes
         self.console.print(
             f"resuming {self.directory} after {self.counters.alignment_steps:,} alignment steps and "
             f"{self.counters.agent_steps:,} agent steps"
         )
 
-    def _undo_metrics_after(self, bytes_kept: int) -> None:
+    def _undo_what_followed_the_checkpoint(self) -> None:
+        """Not on opening a run, for benchmarks open runs that are in progress."""
         metrics = self.directory / "metrics.jsonl"
         if metrics.exists():
             with metrics.open("r+b") as file:
-                file.truncate(bytes_kept)
+                file.truncate(self._metrics_bytes)
+        drop_later_rows(self.directory, self.counters.agent_steps)
 
     def _checkpoint_if_due(self) -> None:
         if time.monotonic() - self._saved_at > 60 * self.run.training.checkpoint_minutes:
             self._checkpoint()
 
     def _checkpoint(self) -> None:
+        self._metrics_bytes = self.tracker.bytes_written()
         save_checkpoint(
             self.directory / "checkpoints",
-            Progress(self.counters, dict(self.rng.bit_generator.state), self.tracker.bytes_written()),
+            Progress(self.counters, dict(self.rng.bit_generator.state), self._metrics_bytes),
             self.components.stateful(),
         )
         self._saved_at = time.monotonic()
