@@ -62,9 +62,9 @@ class Reading:
     """Resident bytes at most."""
 
 
-def status_bytes(name: str) -> int:
-    """A line of this process's /proc/self/status, such as VmHWM, in bytes."""
-    for line in Path("/proc/self/status").read_text().splitlines():
+def status_bytes(name: str, process: int | str = "self") -> int:
+    """A line of a process's /proc/PID/status, such as VmHWM, in bytes."""
+    for line in Path(f"/proc/{process}/status").read_text().splitlines():
         if line.startswith(f"{name}:"):
             return int(line.split()[1]) * 1024
     raise BootifolError(f"the system does not say how much memory a process has ({name}): run this on Linux")
