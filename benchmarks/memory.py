@@ -264,7 +264,8 @@ def line_through(readings: dict[int, int]) -> Growth:
         )
     steps, sizes = list(readings), list(readings.values())
     line = linregress(steps, sizes)
-    return Growth(steps[0], steps[-1], len(steps), sizes[0], sizes[-1], float(line.slope), float(line.stderr))
+    error = 0.0 if len(set(sizes)) == 1 else float(line.stderr)  # which is NaN where nothing varies
+    return Growth(steps[0], steps[-1], len(steps), sizes[0], sizes[-1], float(line.slope), error)
 
 
 def finished(words: Sequence[str]) -> None:

@@ -223,7 +223,12 @@ def milliseconds(work: Work, runs: int) -> list[float]:
 
 
 def measure(
-    table: ResumableTable, names: Sequence[str], preset_name: str, threads: int, runs: int, scratch: Path | None
+    table: ResumableTable,
+    names: Sequence[str],
+    preset_name: str,
+    threads: int,
+    runs: int,
+    scratch: Path | None,
 ) -> None:
     """Adds to the table what it lacks of these panels."""
     with progress("timing", sum(len(PANELS[name].sizes) for name in names)) as advance:

@@ -52,10 +52,14 @@ def test_tables_divide_what_is_resident_by_what_is_announced() -> None:
     assert lines[4] == "| all of these | 200.0 | 202.0 | 1.010 |"
     assert lines[5].endswith("| 8000.0 | 2000.0 | 0.250 |")
     growth = memory.Growth(500, 2000, 40, 600_000_000, 601_000_000, 650.0, 30.0)
-    assert memory.growth_table(growth).splitlines()[2] == "| 500 to 2,000 | 40 | 600.0 | 601.0 | 650.0 | 30.0 |"
+    assert (
+        memory.growth_table(growth).splitlines()[2] == "| 500 to 2,000 | 40 | 600.0 | 601.0 | 650.0 | 30.0 |"
+    )
 
 
-@pytest.mark.parametrize(("words", "sentence"), [(["--steps", "3"], "--steps"), (["--transitions", "1"], "--trans")])
+@pytest.mark.parametrize(
+    ("words", "sentence"), [(["--steps", "3"], "--steps"), (["--transitions", "1"], "--trans")]
+)
 def test_too_little_to_measure_is_a_sentence(
     words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

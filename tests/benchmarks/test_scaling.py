@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from benchmarks.engine import Work
 from PIL import Image
 
 from benchmarks import scaling
-from benchmarks.engine import Work
 from bootifol.demos.demo_set import DemoSet
 from bootifol.errors import BootifolError
 from bootifol.presets import SMOKE
@@ -37,7 +37,7 @@ def test_only_what_is_missing_is_timed(tmp_path: Path, monkeypatch: pytest.Monke
     words = ["--panels", "batch", "--runs", "2", "--threads", "1", "--out", str(out)]
     words += ["--scratch", str(tmp_path)]
     assert scaling.main(words) == 0
-    assert {stage for stage in worked} == {(10, "quick"), (10, "slow"), (20, "quick")}
+    assert set(worked) == {(10, "quick"), (10, "slow"), (20, "quick")}
     assert len(worked) == 3 * (1 + 2)  # one run that is not counted, two that are
     whole = out.read_text().splitlines()
     out.write_text("\n".join(line for line in whole if "slow" not in line))
@@ -70,7 +70,7 @@ def test_only_sizes_that_the_reward_reads_are_timed_with_it(tmp_path: Path, size
 def test_linear_growth_has_slope_one(panel: scaling.Panel) -> None:
     linear = {size: 3.0 * panel.amount(size) for size in panel.sizes}
     assert scaling.last_slope(panel, linear) == pytest.approx(1.0)
-    assert scaling.last_slope(panel, {size: 3.0 for size in panel.sizes}) == pytest.approx(0.0)
+    assert scaling.last_slope(panel, dict.fromkeys(panel.sizes, 3.0)) == pytest.approx(0.0)
     assert scaling.last_slope(panel, {panel.sizes[0]: 3.0}) is None
 
 
