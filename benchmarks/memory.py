@@ -10,8 +10,10 @@ the demo set's index, and the encodings that the reward keeps of expert videos (
 
 **Growth.** `train` itself runs on a small task with networks next to nothing, so that thousands of agent steps take
 seconds; evaluations, checkpoints and logs are part of it. From outside, its resident memory is read whenever it logs.
-The slope is a least-squares line's over all but the first quarter of the agent steps, in which the stores fill. Its
-standard error takes the readings to be independent, and memory moves in steps: look at first and last, too.
+The slope is a least-squares line's over the second half of the agent steps: in the first, the stores fill and the
+process meets its largest gradient steps, whose memory it keeps. Its standard error takes the readings to be
+independent, and memory moves in steps: look at first and last, too, and believe a slope only if a run of twice the
+length has it as well.
 
 Two Markdown tables come out. Linux only.
 """
@@ -55,8 +57,8 @@ from bootifol.types import Episode, FrameBatch, Video
 Measured = TypeVar("Measured")
 
 LIMIT = 8000 * MB
-SETTLED = 0.25
-"""Share of the agent steps before which memory may still grow: the stores fill."""
+SETTLED = 0.5
+"""Share of the agent steps before which memory may still grow."""
 
 SMALL_RUN = """
     --preset smoke --threads 1 --pictures.agent-size 32 --pictures.video-size 32 --agent.replay-capacity 350
@@ -232,11 +234,15 @@ def growth(task: str, agent_steps: int) -> Growth:
         # Its messages go to a file: they matter only where it fails, and a pipe nobody reads would fill.
         with (Path(temporary) / "messages").open("w+") as messages:
             process = subprocess.Popen(command, stdout=messages, stderr=messages)
-            while process.poll() is None:
-                step = newest_step(out / "metrics.jsonl")
-                if step not in readings and 0 < step < agent_steps:
-                    readings[step] = status_bytes("VmRSS", process.pid)
-                time.sleep(0.02)
+            try:
+                while process.poll() is None:
+                    step = newest_step(out / "metrics.jsonl")
+                    if step not in readings and 0 < step < agent_steps:
+                        readings[step] = status_bytes("VmRSS", process.pid)
+                    time.sleep(0.02)
+            finally:  # whoever interrupts this leaves no run behind
+                process.kill()
+                process.wait()
             if process.returncode:
                 messages.seek(0)
                 raise BootifolError(f"the small run on {task} failed: {messages.read().strip()}")
@@ -281,7 +287,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--preset", default="cpu", choices=["cpu", "paper", "demo", "drawn", "smoke"])
     parser.add_argument("--task", default="reacher_hard", help="whose stores are filled")
     parser.add_argument("--transitions", type=int, default=100_000, help="that replay holds")
-    parser.add_argument("--steps", type=int, default=2000, help="agent steps of the small run")
+    parser.add_argument("--steps", type=int, default=6000, help="agent steps of the small run")
     parser.add_argument("--small-task", default="drawn_home", help="what the small run learns")
     arguments = parser.parse_args(words)
     try:

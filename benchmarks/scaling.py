@@ -51,7 +51,7 @@ from bootifol.memory import keep_freed_memory
 from bootifol.networks.frame_encoders import picture_sizes
 from bootifol.presets import preset
 from bootifol.progress import progress
-from bootifol.reports.style import FAINT, RUN_COLORS, house_style, legend_above, save_png
+from bootifol.reports.style import FAINT, RUN_COLORS, RUN_DASHES, house_style, legend_above, save_png
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.training.config import TrainingConfig
 
@@ -307,9 +307,17 @@ def draw_panel(axes: Axes, panel: Panel, found: Mapping[str, Curve], stages: Seq
     axes.set_xlabel(panel.label)
     axes.set_ylabel("milliseconds")
     for stage, curve in found.items():
-        color = RUN_COLORS[stages.index(stage) % len(RUN_COLORS)]
-        amounts = [panel.amount(size) for size in curve]
-        axes.plot(amounts, list(curve.values()), color=color, marker="o", markersize=4, label=stage)
+        # Dashes tell apart stages that share a color, of which there are fewer.
+        dashes, color = divmod(stages.index(stage), len(RUN_COLORS))
+        axes.plot(
+            [panel.amount(size) for size in curve],
+            list(curve.values()),
+            color=RUN_COLORS[color],
+            linestyle=RUN_DASHES[dashes],
+            marker="o",
+            markersize=4,
+            label=stage,
+        )
     if found:
         ends = [panel.amount(panel.sizes[0]), panel.amount(panel.sizes[-1])]
         highest = 2 * max(max(curve.values()) for curve in found.values())
