@@ -77,8 +77,8 @@ class Rates(NamedTuple):
 class RandomVideos:
     """A source of random pixels, behind the protocol of demo sets."""
 
-    def __init__(self, count: int, size: int, rng: np.random.Generator) -> None:
-        self.frames = rng.integers(0, 256, (count, FRAMES, size, size, 3), dtype=np.uint8)
+    def __init__(self, count: int, size: int, rng: np.random.Generator, frames: int = FRAMES) -> None:
+        self.frames = rng.integers(0, 256, (count, frames, size, size, 3), dtype=np.uint8)
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -155,10 +155,10 @@ def alignment_step(config: TrainingConfig, reward: BootifolConfig) -> Stage:
     )
 
 
-def label_episode(config: TrainingConfig, reward: BootifolConfig) -> Stage:
-    """Rewarding an episode of 61 frames against one expert video whose encoding is not cached yet."""
+def label_episode(config: TrainingConfig, reward: BootifolConfig, frames: int = FRAMES) -> Stage:
+    """Rewarding an episode against one expert video whose encoding is not cached yet."""
     rng = np.random.default_rng(0)
-    videos = RandomVideos(2, config.pictures.video_size, rng)
+    videos = RandomVideos(2, config.pictures.video_size, rng, frames)
     one_reference = replace(reward, references=1, aggregate="mean")
     model = BootifolRewardModel(one_reference, config.pictures.video_size, 0)
     plain = PlainBootifol(reward.width_divisor)

@@ -7,8 +7,8 @@ from pathlib import Path
 from bootifol.errors import BootifolError
 
 
-def status_bytes(name: str) -> int:
-    """A line of this process's /proc/self/status in bytes: VmRSS is what it has now, VmHWM what it had at most.
+def status_bytes(name: str, process: int | str = "self") -> int:
+    """A line of a process's /proc/PID/status in bytes: VmRSS is what it has now, VmHWM what it had at most.
 
     Not `ru_maxrss`, which on Linux begins with what the process that started this one had.
 
@@ -16,7 +16,7 @@ def status_bytes(name: str) -> int:
         BootifolError: the system has no such file or line.
     """
     try:
-        lines = Path("/proc/self/status").read_text().splitlines()
+        lines = Path(f"/proc/{process}/status").read_text().splitlines()
     except OSError:
         lines = []
     for line in lines:

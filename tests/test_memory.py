@@ -34,3 +34,34 @@ def test_freed_memory_is_reused_without_page_faults() -> None:
     pages = 5 * (20 << 20) // 4096
     assert _page_faults() > pages / 2
     assert _page_faults("keep") < pages / 100
+
+
+FULL_STORES = """
+from pathlib import Path
+import numpy as np
+from bootifol.demos.agent_videos import AgentVideos
+from bootifol.memory import keep_freed_memory
+from bootifol.replay.buffer import ReplayBuffer
+from bootifol.types import Episode, Video
+
+def resident():
+    line = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmRSS"))
+    return 1024 * int(line.split()[1])
+
+keep_freed_memory()
+frames = np.ones((61, 64, 64, 3), np.uint8)
+episode = Episode(frames, np.zeros((60, 2), np.float32), Video("same", frames), False)
+before = resident()
+replay, videos = ReplayBuffer(61 * 80, 64, 2), AgentVideos(40, 61, 64)
+for _ in range(80):
+    replay.add(episode, np.zeros(60, np.float32))
+    videos.add(episode.video)
+announced = ReplayBuffer.bytes_needed(61 * 80, 64, 2) + AgentVideos.bytes_needed(40, 61, 64)
+print((resident() - before) / announced)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_full_stores_take_the_memory_that_a_run_announces() -> None:
+    done = subprocess.run([sys.executable, "-c", FULL_STORES], capture_output=True, text=True, check=True)
+    assert float(done.stdout) == pytest.approx(1.0, abs=0.1)
