@@ -107,7 +107,8 @@ def from_json(kind: type[_Config], data: dict[str, Any], where: str) -> _Config:
     unknown = sorted(set(data) - set(hints))
     if unknown:
         raise BootifolError(
-            f"{where} names {', '.join(unknown)}, which this version of bootifol does not know"
+            f"{where} names {', '.join(unknown)}, which this version of bootifol does not know: go on with the version "
+            "that made the run, or start a new one"
         )
     values: dict[str, Any] = {}
     for name, value in data.items():
