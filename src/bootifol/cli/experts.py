@@ -14,6 +14,7 @@ def train(
     seed: int = 1,
     learning_rate: float = 3e-4,
     discount: float = 0.99,
+    agent_steps_per_update: int = 1,
     threads: int = 1,
 ) -> int:
     """Train an expert from the simulator's states and its reward, to perform the task for recordings.
@@ -29,6 +30,7 @@ def train(
         seed: Of everything random.
         learning_rate: Of Adam.
         discount: Of future rewards, an agent step.
+        agent_steps_per_update: 1 learns most from each agent step, 2 or more from each minute.
         threads: Threads PyTorch computes with.
     """
     from bootifol.experts.train import ExpertConfig, train_expert
@@ -41,6 +43,7 @@ def train(
         seed=seed,
         learning_rate=learning_rate,
         discount=discount,
+        agent_steps_per_update=agent_steps_per_update,
         threads=threads,
     )
     try:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import csv
 import importlib
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -45,13 +47,21 @@ class ExpertConfig:
     seed: int = 1
     discount: float = 0.99
     learning_rate: float = 3e-4
+    agent_steps_per_update: int = 1
+    """Agent steps for each update of actor and critics; 1 learns most from each step, 2 or more from each minute."""
     evaluation_every: int = 10_000
     """Agent steps between two evaluations; each also writes a checkpoint."""
     evaluation_episodes: int = 10
     threads: int = 1
 
     def __post_init__(self) -> None:
-        counts = ("agent_steps", "evaluation_every", "evaluation_episodes", "threads")
+        counts = (
+            "agent_steps",
+            "agent_steps_per_update",
+            "evaluation_every",
+            "evaluation_episodes",
+            "threads",
+        )
         require_at_least(1, **{f"experts {name}": getattr(self, name) for name in counts})
 
 
@@ -79,11 +89,12 @@ def train_expert(config: ExpertConfig, out: Path) -> StatePolicy:
     with progress(f"training an expert in {config.task}", config.agent_steps, model.num_timesteps) as advance:
         while (done := model.num_timesteps) < config.agent_steps:
             started = time.monotonic()
-            model.learn(
-                min(config.evaluation_every, config.agent_steps - done),
-                reset_num_timesteps=False,
-                progress_bar=False,
-            )
+            with _bfloat16_products():
+                model.learn(
+                    min(config.evaluation_every, config.agent_steps - done),
+                    reset_num_timesteps=False,
+                    progress_bar=False,
+                )
             seconds += time.monotonic() - started
             policy = extract_policy(model.actor)
             returns = evaluate_policy(policy, judged, config.evaluation_episodes)
@@ -104,6 +115,17 @@ def train_expert(config: ExpertConfig, out: Path) -> StatePolicy:
             _save_checkpoint(out / "checkpoint", model)
             advance(model.num_timesteps - done, mean_return=float(np.mean(returns)), best=best)
     return StatePolicy.load(out / "expert.safetensors")
+
+
+@contextmanager
+def _bfloat16_products() -> Iterator[None]:
+    """Matrix products of bfloat16 factors and float32 sums; parameters stay float32. 1.3 times as fast."""
+    before = torch.get_float32_matmul_precision()
+    torch.set_float32_matmul_precision("medium")
+    try:
+        yield
+    finally:
+        torch.set_float32_matmul_precision(before)
 
 
 def _policy_path(out: Path, row: dict[str, str]) -> Path:
@@ -158,10 +180,14 @@ def _make_model(config: ExpertConfig, environment: StateEnvironment) -> Any:
             f"training an expert needs stable-baselines3 and sb3-contrib ({error}): "
             "pip install 'bootifol[experts]'"
         ) from error
+    optimizer: dict[str, Any] = {"fused": True}
+    if config.algorithm == "CrossQ":
+        optimizer["betas"] = (0.5, 0.999)  # CrossQ's own, which giving any option of the optimizer would lose
     return getattr(package, config.algorithm)(
         "MlpPolicy",
         environment,
-        policy_kwargs={"net_arch": list(config.hidden_dims)},
+        policy_kwargs={"net_arch": list(config.hidden_dims), "optimizer_kwargs": optimizer},
+        train_freq=config.agent_steps_per_update,
         learning_rate=config.learning_rate,
         gamma=config.discount,
         buffer_size=config.agent_steps,
