@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Literal
 
 from bootifol.agents.config import DrQv2Config
+from bootifol.demos.augmentation import AugmentationConfig
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.bootifol.config import BootifolConfig
@@ -72,6 +73,7 @@ CPU = TrainingConfig(
         averaging=0.999,
         replay_capacity=40_000,
     ),
+    augmentation=AugmentationConfig(when="imported"),
     alignment=AlignmentConfig(gradient_steps=500),
     interactive=InteractiveConfig(
         agent_steps=30_000,
@@ -87,8 +89,8 @@ CPU = TrainingConfig(
 
 Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
 `motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `saturation_weight`, `averaging` and
-`cloning_weight` of the agent, and `demonstrations`, by which the policy starts as a clone of the videos; each is
-described at its field.
+`cloning_weight` of the agent, `demonstrations`, by which the policy starts as a clone of the videos, and
+`augmentation` where these come from files; each is described at its field.
 """
 
 BACKBONE = TrainingConfig(

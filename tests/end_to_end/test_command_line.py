@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from bootifol.cli.main import main
+from bootifol.demos.augmentation import AugmentedVideos
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.video_writing import write_video
 from bootifol.training.checkpoint import newest_checkpoint
+from bootifol.types import FrameBatch
 
 SMALL = ["--agent-size", "32", "--video-size", "32"]
 SMALL_RUN = [
@@ -106,8 +108,16 @@ def test_a_time_budget_ends_a_run(demos: Path, tmp_path: Path) -> None:
     assert 0 < agent_steps < 10_000_000 and 0 < alignment_steps < 1_000_000
 
 
-def test_random_videos_are_recorded_where_there_are_none(demos: Path, tmp_path: Path) -> None:
-    """As with one's own videos: only the expert's are given."""
+def test_ones_own_videos_are_enough(demos: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Random videos are recorded, and the reward learns from videos of varying looks, the agent's too."""
+    varied = []
+    sample = AugmentedVideos.sample
+
+    def spy(self: AugmentedVideos, count: int, rng: np.random.Generator) -> FrameBatch:
+        varied.append(type(self.videos).__name__)
+        return sample(self, count, rng)
+
+    monkeypatch.setattr(AugmentedVideos, "sample", spy)
     mine = tmp_path / "mine"
     videos = tmp_path / "videos"
     expert = DemoSet.open(demos / "expert")
@@ -117,6 +127,12 @@ def test_random_videos_are_recorded_where_there_are_none(demos: Path, tmp_path: 
     assert main(imported) == 0
     assert main(["train", *SMALL_RUN, "--demos", str(mine), "--out", str(tmp_path / "run")]) == 0
     assert len(DemoSet.open(mine / "random")) == 4
+    assert set(varied) == {"VideoSubset", "AgentVideos"}
+    updated = varied.count("AgentVideos")
+    assert varied.count("VideoSubset") == 2 * 6 + updated, "expert and random, then expert and agent"
+    varied.clear()
+    assert main(["train", *SMALL_RUN, "--demos", str(demos), "--out", str(tmp_path / "recorded")]) == 0
+    assert not varied
 
 
 @pytest.mark.parametrize(

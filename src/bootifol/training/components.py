@@ -14,6 +14,7 @@ from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.encodings import FrameEncodings
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.demos.agent_videos import AgentVideos
+from bootifol.demos.augmentation import AugmentationConfig
 from bootifol.demos.check import differences
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.demos.features import FeaturizedVideos, without_pixels
@@ -44,6 +45,8 @@ class Demos:
     """Videos of a random policy, the other class of the Alignment Phase."""
     held_out: dict[str, list[Video]]
     """Videos by kind that the reward never learns from, to see whether it ranks them right."""
+    augmentation: AugmentationConfig | None = None
+    """How videos vary in looks when the reward learns from them; None where they do not."""
 
 
 @dataclass(frozen=True)
@@ -261,7 +264,11 @@ def open_demos(run: RunConfig, console: Console) -> Demos:
             featurized.compute()
         featurized_aside = FeaturizedVideos(aside, backbone)
         kept[kind] = without_pixels(featurized_aside[index] for index in range(len(aside)))
-    return Demos(sources["expert"], sources["random"], kept if held_out else {})
+    config = run.training.augmentation
+    augments = backbone is None and config.applies(imported=expert.manifest.conversion is not None)
+    if augments:
+        console.print("the reward learns from videos of varying looks (augmentation)")
+    return Demos(sources["expert"], sources["random"], kept if held_out else {}, config if augments else None)
 
 
 def reference_rng(seed: int, agent_steps: int) -> np.random.Generator:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bootifol.agents.config import DrQv2Config
+from bootifol.demos.augmentation import AugmentationConfig
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import require_at_least
 from bootifol.rewards.registry import RewardConfig
@@ -103,6 +104,7 @@ class TrainingConfig:
     pictures: PictureConfig = field(default_factory=PictureConfig)
     reward: RewardConfig = field(default_factory=RewardConfig)
     agent: DrQv2Config = field(default_factory=DrQv2Config)
+    augmentation: AugmentationConfig = field(default_factory=AugmentationConfig)
     alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
     interactive: InteractiveConfig = field(default_factory=InteractiveConfig)
     demonstrations: DemonstrationConfig = field(default_factory=DemonstrationConfig)

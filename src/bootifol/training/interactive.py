@@ -14,6 +14,7 @@ import numpy as np
 
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.demos.agent_videos import AgentVideos
+from bootifol.demos.augmentation import AugmentationConfig, augmented
 from bootifol.envs.rollout import EpisodeRecorder, rollout
 from bootifol.evaluation.ranking import draw_references
 from bootifol.networks.backbones import Backbone
@@ -52,6 +53,8 @@ class InteractivePhase:
     """Draws reference videos and replay batches."""
     backbone: Backbone | None = None
     """Computes the features of every frame once, where the reward model reads features."""
+    augmentation: AugmentationConfig | None = None
+    """How videos vary in looks when the reward learns from them; None where they do not."""
 
     def __post_init__(self) -> None:
         self.averages = Averages()
@@ -127,7 +130,8 @@ class InteractivePhase:
         if resting and not self.reward_model.keeps_learning:
             return
         version = self.reward_model.version
-        self.averages.add(self.reward_model.update(self.expert, self.agent_videos))
+        expert, agent = (augmented(videos, self.augmentation) for videos in (self.expert, self.agent_videos))
+        self.averages.add(self.reward_model.update(expert, agent))
         if self.reward_model.version == version:
             return  # nothing was learned, so no stored reward is stale
         self.counters.reward_updates += 1

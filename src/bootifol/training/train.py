@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from rich.console import Console
 
+from bootifol.demos.augmentation import augmented
 from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import (
@@ -95,6 +96,7 @@ class Run:
             self.run.seed,
             self.rng,
             self.components.backbone,
+            self.demos.augmentation,
         )
         self._saved_at = time.monotonic()
         self._last_evaluation: dict[str, float] = {}
@@ -134,9 +136,11 @@ class Run:
         shown: dict[str, float] = {}
         unit, done, total = self.budget.alignment_extent(self.counters)
         with progress("aligning the reward", total, done, unit) as advance:
-            for metrics in alignment_phase(
-                model, self.demos.expert, self.demos.random, self.budget, self.counters
-            ):
+            expert, random = (
+                augmented(videos, self.demos.augmentation)
+                for videos in (self.demos.expert, self.demos.random)
+            )
+            for metrics in alignment_phase(model, expert, random, self.budget, self.counters):
                 averages.add(metrics)
                 if self.counters.alignment_steps % config.log_every == 0:
                     means = averages.pop()
