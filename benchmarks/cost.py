@@ -24,6 +24,7 @@ from typing import NamedTuple
 import torch
 from rich.console import Console
 
+from benchmarks.command import command
 from benchmarks.process_memory import status_bytes
 from benchmarks.resumable_table import ResumableTable
 from benchmarks.rows import markdown
@@ -70,7 +71,8 @@ FEW_VIDEOS = 40
 """Recorded where the task has none, and used as demonstrations."""
 
 
-def main() -> int:
+@command(resumes=True)
+def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -85,16 +87,11 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="results/TASK/cost_PRESET.csv")
     parser.add_argument("--measure", help=argparse.SUPPRESS)  # what the fresh process does
     arguments = parser.parse_args()
-    try:
-        if arguments.measure is not None:
-            system = systems(arguments.preset, [arguments.measure])[0]
-            print(json.dumps(measured(arguments, system)))
-        else:
-            compare(arguments)
-    except BootifolError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+    if arguments.measure is not None:
+        system = systems(arguments.preset, [arguments.measure])[0]
+        print(json.dumps(measured(arguments, system)))
+    else:
+        compare(arguments)
 
 
 def systems(preset_name: str, names: Sequence[str] | None) -> list[System]:
