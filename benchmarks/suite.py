@@ -48,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("name", metavar="NAME", help="of the suite")
     made.add_argument("--out", type=Path, help="directory of the runs (runs/NAME)")
     made.add_argument(
-        "--demos", type=Path, default=Path("demos"), help="directory of the videos, one a task (demos)"
+        "--demos", type=Path, default=Path("demos"), help="directory of the videos, one set a task (demos)"
     )
     made.add_argument(
         "--workers", type=int, default=1, help="runs side by side, each on a core of its own (1)"
