@@ -20,10 +20,12 @@ import torch
 from rich.console import Console
 from scipy import stats
 
+from benchmarks.command import command
 from benchmarks.diagnosis import performers
 from bootifol.demos.demo_set import DemoSet
 from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.rollout import play_episode
+from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import KINDS, draw_references, rank_videos, ranking_scores
 from bootifol.files import written_aside
 from bootifol.memory import keep_freed_memory
@@ -58,6 +60,7 @@ def graded(task: str, pictures: PictureConfig, episodes: int) -> tuple[list[Vide
     return videos, returns
 
 
+@command()
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -81,6 +84,8 @@ def main() -> None:
         held_out[kind] = [aside[index] for index in range(len(aside))]
     rows: list[dict[str, object]] = []
     chosen = variants(preset(arguments.preset).reward.bootifol)
+    if unknown := [name for name in arguments.only or () if name not in chosen]:
+        raise BootifolError(f"there is no variant '{unknown[0]}'; the variants are {', '.join(chosen)}")
     if arguments.only:
         chosen = {name: chosen[name] for name in arguments.only}
     videos, returns = graded(arguments.task, preset(arguments.preset).pictures, episodes=8)
@@ -122,4 +127,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import shlex
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,11 +22,11 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.command import STOPPED, command
 from bootifol.cli.main import main as bootifol
 from bootifol.demos.video_writing import write_video
 from bootifol.envs.any_gymnasium import GymnasiumSimulator
 from bootifol.envs.pictures import PictureConfig
-from bootifol.errors import BootifolError
 from bootifol.progress import progress
 
 Controller = Callable[[Any], NDArray[np.float64]]
@@ -112,18 +111,22 @@ def film(example: Example, directory: Path, episodes: int) -> float:
     return 1.0 / simulator.step_seconds
 
 
-def command(*words: str) -> None:
+def typed(*words: str) -> None:
     """Types one command of bootifol.
 
     Raises:
-        SystemExit: it failed.
+        KeyboardInterrupt: it was stopped.
+        SystemExit: it failed, and has said why.
     """
     print(f"$ bootifol {shlex.join(words)}", flush=True)
     code = bootifol(words)
+    if code == STOPPED:
+        raise KeyboardInterrupt
     if code:
-        sys.exit(code)
+        raise SystemExit(code)
 
 
+@command(resumes=True)
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -139,25 +142,24 @@ def main() -> None:
     videos, demos, run = out / "videos", out / "demos", out / "run"
     task = f"gymnasium:{example.identifier}"
     lengths = ["--action-repeat", str(example.action_repeat), "--episode-steps", str(example.episode_steps)]
-    try:
-        rate = film(example, videos, arguments.episodes) / example.action_repeat
-    except BootifolError as error:
-        sys.exit(f"error: {error}")
+    rate = film(example, videos, arguments.episodes) / example.action_repeat
     if not demos.exists():
         shape = ["--fps", f"{rate:g}", "--frames", str(example.episode_steps + 1)]
-        command("demos", "import", str(videos), "--out", str(demos), *shape, "--windows", "first")
-    command("demos", "check", str(demos), "--task", task, *lengths)
+        typed("demos", "import", str(videos), "--out", str(demos), *shape, "--windows", "first")
+    typed("demos", "check", str(demos), "--task", task, *lengths)
     if (run / "config.json").exists():
-        command("train", "--resume", str(run))
+        typed("train", "--resume", str(run))
     else:
-        command(
+        typed(
             *("train", "--task", task, *lengths, "--demos", str(demos), "--out", str(run)),
             *("--preset", arguments.preset, "--time-budget", arguments.time_budget),
             *("--threads", arguments.threads),
         )
-    command("evaluate", str(run), "--episodes", "10")
-    command("tasks", task, "--measure", "10")
+    if not (run / "report.html").exists():  # the last thing a run writes; Ctrl-C made it stop before
+        raise KeyboardInterrupt
+    typed("evaluate", str(run), "--episodes", "10")
+    typed("tasks", task, "--measure", "10")
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

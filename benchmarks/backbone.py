@@ -15,6 +15,7 @@ import torch
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.command import command
 from bootifol.networks.backbones import Backbone, load_backbone
 from bootifol.types import Frames
 
@@ -29,6 +30,7 @@ def frames_per_second(backbone: Backbone, frames: Frames, runs: int) -> float:
     return len(frames) / min(seconds)
 
 
+@command()
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -52,4 +54,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -16,6 +16,7 @@ import numpy as np
 import torch
 from rich.console import Console
 
+from benchmarks.command import command
 from benchmarks.resumable_table import ResumableTable
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.inverse_dynamics import InverseDynamics
@@ -58,6 +59,7 @@ class Recorded:
         raise NotImplementedError("cloning draws transitions, not videos")
 
 
+@command(resumes=True)
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -159,4 +161,4 @@ def evaluate_expert(arguments: argparse.Namespace, config: TrainingConfig, steps
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

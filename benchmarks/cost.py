@@ -24,6 +24,7 @@ from typing import NamedTuple
 import torch
 from rich.console import Console
 
+from benchmarks.command import command
 from benchmarks.process_memory import status_bytes
 from benchmarks.resumable_table import ResumableTable
 from benchmarks.rows import markdown
@@ -31,10 +32,10 @@ from benchmarks.run_queue import PROGRAM, missing_demos, record_words
 from benchmarks.suites import (
     RANDOM,
     VIDEOS,
+    PlannedRun,
     System,
     every_system,
     policy_input_ablation,
-    with_overrides,
 )
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.errors import BootifolError
@@ -70,7 +71,8 @@ FEW_VIDEOS = 40
 """Recorded where the task has none, and used as demonstrations."""
 
 
-def main() -> int:
+@command(resumes=True)
+def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -85,20 +87,20 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="results/TASK/cost_PRESET.csv")
     parser.add_argument("--measure", help=argparse.SUPPRESS)  # what the fresh process does
     arguments = parser.parse_args()
-    try:
-        if arguments.measure is not None:
-            system = systems(arguments.preset, [arguments.measure])[0]
-            print(json.dumps(measured(arguments, system)))
-        else:
-            compare(arguments)
-    except BootifolError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+    if arguments.measure is not None:
+        system = systems(arguments.preset, [arguments.measure], arguments.task)[0]
+        print(json.dumps(measured(arguments, system)))
+    else:
+        compare(arguments)
 
 
-def systems(preset_name: str, names: Sequence[str] | None) -> list[System]:
+def systems(preset_name: str, names: Sequence[str] | None, task: str) -> list[System]:
     """The systems of the paper's tables that learn, and the encoding-based agent, by name.
+
+    Args:
+        preset_name: of the suites that have them.
+        names: of those wanted; None for all that are compared on the task.
+        task: its name.
 
     Raises:
         BootifolError: there is none of a name.
@@ -112,7 +114,7 @@ def systems(preset_name: str, names: Sequence[str] | None) -> list[System]:
     for name in names or ():
         if name not in known:
             raise BootifolError(f"there is no system '{name}'; the systems are {', '.join(known)}")
-    return [known[name] for name in names or known]
+    return [known[name] for name in names or known if names or known[name].is_compared_on(task)]
 
 
 def compare(arguments: argparse.Namespace) -> None:
@@ -122,16 +124,13 @@ def compare(arguments: argparse.Namespace) -> None:
     results = ResumableTable(out, tuple(COLUMNS), key=4)
     missing = [
         system
-        for system in systems(arguments.preset, arguments.systems)
+        for system in systems(arguments.preset, arguments.systems, arguments.task)
         if not results.has(arguments.task, arguments.preset, system.name, arguments.threads)
     ]
     with tempfile.TemporaryDirectory() as temporary:
-        demos = arguments.demos / task
-        if missing and missing_demos(demos):
-            demos = Path(temporary) / "demos"
-            record(arguments.task, preset(arguments.preset), demos)
         for number, system in enumerate(missing, start=1):
             print(f"measuring {system.name} ({number} of {len(missing)})", file=sys.stderr, flush=True)
+            demos = videos_of(planned(arguments, system), arguments.demos, Path(temporary))
             words = ["--task", arguments.task, "--preset", arguments.preset, "--demos", str(demos)]
             words += ["--steps", str(arguments.steps), "--threads", str(arguments.threads)]
             command = [sys.executable, "-m", "benchmarks.cost", *words, "--measure", system.name]
@@ -145,19 +144,34 @@ def compare(arguments: argparse.Namespace) -> None:
     print(table, end="")
 
 
-def record(task: str, config: TrainingConfig, directory: Path) -> None:
-    """A few videos, which cost as much to learn from as many."""
-    words = record_words(task, config, directory, FEW_VIDEOS, ("expert", "random"))
+def planned(arguments: argparse.Namespace, system: System) -> PlannedRun:
+    """The run of a suite that is measured in part."""
+    return PlannedRun(arguments.task, system.preset or arguments.preset, system, seed=1)
+
+
+def videos_of(run: PlannedRun, demos: Path, spare: Path) -> Path:
+    """Where a run's videos are; if nowhere, a few are recorded in `spare`: they cost as much to learn from as many.
+
+    Raises:
+        BootifolError: there are none, and none could be recorded.
+    """
+    for place in (demos, spare):
+        if not missing_demos(place / run.demos_name):
+            return place / run.demos_name
+    directory = spare / run.demos_name
+    words = record_words(run.task, run.config, directory, FEW_VIDEOS, ("expert", "random"))
     if subprocess.run([*PROGRAM, *words]).returncode:
-        raise BootifolError(f"there are no videos of {task} and none could be recorded: see above")
+        raise BootifolError(f"there are no videos of {run.task} and none could be recorded: see above")
+    return directory
 
 
 def measured(arguments: argparse.Namespace, system: System) -> dict[str, str]:
     """A row of the table: one method in this process."""
-    config = replace(with_overrides(preset(arguments.preset), system.overrides), threads=arguments.threads)
+    of_suite = planned(arguments, system)
+    config = replace(of_suite.config, threads=arguments.threads)
     with tempfile.TemporaryDirectory() as temporary:
         described = RunConfig(
-            arguments.task, system.method, arguments.preset, 1, str(arguments.demos), None, shortened(config)
+            arguments.task, system.method, of_suite.preset, 1, str(arguments.demos), None, shortened(config)
         )
         run = Run(described, Path(temporary), Console(quiet=True))
         prepare(run)

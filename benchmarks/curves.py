@@ -10,12 +10,14 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from benchmarks.command import command
 from bootifol.files import written_aside
 from bootifol.reports.plots import draw_return_curves, looks_of
 from bootifol.reports.run_files import read_run
 from bootifol.reports.style import house_style
 
 
+@command()
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -37,4 +39,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from scipy import stats
 
+from benchmarks.command import command
 from bootifol.envs.rollout import Act, play_episode
 from bootifol.evaluation.ranking import draw_references
 from bootifol.experts import make_expert
@@ -122,6 +123,7 @@ def staleness(run: Run, episodes: int) -> NDArray[np.float64]:
     return np.array(pairs, np.float64)
 
 
+@command()
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -222,4 +224,4 @@ def draw(
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -27,6 +27,7 @@ from rich.table import Column, Table
 from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
 
+from benchmarks.command import command
 from benchmarks.plain.alignment import PlainBootifol
 from benchmarks.plain.drqv2 import PlainDrQv2, PlainReplay
 from bootifol.agents.drqv2 import DrQv2
@@ -219,6 +220,7 @@ def medians(ours: Work, plain: Work, runs: int, warm_up: int) -> tuple[float, fl
     return statistics.median(times[0]), statistics.median(times[1])
 
 
+@command()
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--threads", type=int, default=torch.get_num_threads())
@@ -285,4 +287,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from bootifol.errors import BootifolError
 from bootifol.reports.run_files import RunFiles, find_runs, read_run
 from bootifol.reports.style import save_png
 
@@ -29,20 +27,15 @@ def figure_parser(description: str | None) -> argparse.ArgumentParser:
     return parser
 
 
-def write_figure(parser: argparse.ArgumentParser, draw: Draw, arguments: Sequence[str] | None = None) -> int:
+def write_figure(parser: argparse.ArgumentParser, draw: Draw, arguments: Sequence[str] | None = None) -> None:
     """Reads the runs, draws, writes; prints what must be said about the figure.
 
-    Returns:
-        The exit code: 0, or 2 after bad input, which one sentence explains.
+    Raises:
+        BootifolError: there are no such runs, or the figure cannot be drawn from them.
     """
     parsed = parser.parse_args(arguments)
-    try:
-        figure, notes = draw([read_run(run_dir) for run_dir in find_runs(parsed.runs)], parsed)
-        save_png(figure, parsed.out)
-    except BootifolError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    figure, notes = draw([read_run(run_dir) for run_dir in find_runs(parsed.runs)], parsed)
+    save_png(figure, parsed.out)
     for note in notes:
         print(f"- {note}")
     print(f"figure: {parsed.out}")
-    return 0

@@ -9,11 +9,11 @@ The start is the first of the run's showcase, so that nobody chose it by how it 
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from benchmarks.command import command
 from benchmarks.figure_command import figure_parser, write_figure
 from bootifol.reports.film_strip import expert_above_agent
 from bootifol.reports.run_files import RunFiles
@@ -23,11 +23,12 @@ def draw(runs: list[RunFiles], arguments: argparse.Namespace) -> tuple[Figure, S
     return expert_above_agent(runs, arguments.start), []
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@command()
+def main(arguments: Sequence[str] | None = None) -> None:
     parser = figure_parser(__doc__)
     parser.add_argument("--start", type=int, default=0, help="which start of the showcase, from 0")
-    return write_figure(parser, draw, arguments)
+    write_figure(parser, draw, arguments)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

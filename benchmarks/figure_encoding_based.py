@@ -6,11 +6,11 @@ python -m benchmarks.figure_encoding_based runs/encoding_based --out docs/images
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from benchmarks.command import command
 from benchmarks.figure_command import figure_parser, write_figure
 from bootifol.reports.figures import ablation_figure
 from bootifol.reports.run_files import RunFiles, flattened
@@ -30,9 +30,10 @@ def draw(runs: list[RunFiles], arguments: argparse.Namespace) -> tuple[Figure, S
     return ablation_figure(runs, variant, (FIELD,), "add one of the other kind (--agent.observations)")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    return write_figure(figure_parser(__doc__), draw, arguments)
+@command()
+def main(arguments: Sequence[str] | None = None) -> None:
+    write_figure(figure_parser(__doc__), draw, arguments)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

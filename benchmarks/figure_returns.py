@@ -8,11 +8,11 @@ Mean over seeds, with 95 % bootstrap intervals. Unfinished runs are left out and
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from benchmarks.command import command
 from benchmarks.figure_command import figure_parser, write_figure
 from bootifol.reports.comparison import compare
 from bootifol.reports.figures import returns_figure
@@ -28,11 +28,12 @@ def draw(runs: list[RunFiles], arguments: argparse.Namespace) -> tuple[Figure, S
     return returns_figure(comparison, arguments.by_time), [*comparison.notes, *left_out]
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@command()
+def main(arguments: Sequence[str] | None = None) -> None:
     parser = figure_parser(__doc__)
     parser.add_argument("--by-time", action="store_true", help="over wall-clock time instead of agent steps")
-    return write_figure(parser, draw, arguments)
+    write_figure(parser, draw, arguments)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -8,11 +8,11 @@ L_seq is the sum of L_Z and L_O, as in the paper, whatever the weights of a run.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from benchmarks.command import command
 from benchmarks.figure_command import figure_parser, write_figure
 from bootifol.reports.comparison import compare
 from bootifol.reports.figures import Loss, losses_figure
@@ -29,9 +29,10 @@ def draw(runs: list[RunFiles], arguments: argparse.Namespace) -> tuple[Figure, S
     return losses_figure(comparison, INTERACTIVE, LOSSES), comparison.notes
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    return write_figure(figure_parser(__doc__), draw, arguments)
+@command()
+def main(arguments: Sequence[str] | None = None) -> None:
+    write_figure(figure_parser(__doc__), draw, arguments)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import resource
-import sys
+import signal
 import tempfile
 import time
 from collections import Counter
@@ -26,6 +26,8 @@ from typing import Any
 
 import numpy as np
 from tests.demos.awkward_files import make_all
+
+from benchmarks.command import command
 
 BAD = ("crash", "hang", "exception", "short read")
 
@@ -78,6 +80,7 @@ def read_files(orders: Connection) -> None:
     from bootifol.demos.video_files import stream_video
     from bootifol.errors import BootifolError
 
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this process
     av.logging.set_level(None)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     while True:
@@ -130,6 +133,7 @@ class Reader:
             self._process = None
 
 
+@command()
 def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -185,4 +189,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
+from benchmarks.command import command
 from bootifol.demos.record import Recording, play
 from bootifol.envs.pictures import PictureConfig
 from bootifol.experts import Behavior
@@ -39,6 +40,7 @@ def strip(task: Task, behavior: Behavior, seed: int) -> Frames:
     return evenly
 
 
+@command()
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -78,4 +80,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.command import command
 from bootifol.envs.rollout import play_episode
 from bootifol.errors import BootifolError
 from bootifol.experts import make_expert
@@ -30,6 +31,7 @@ SMALL = 0.3
 """Actions below this in every dimension are small: the expert approaches its goal or corrects."""
 
 
+@command()
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -75,4 +77,4 @@ def table(moving: NDArray[np.bool_], error: NDArray[np.float32], action: NDArray
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

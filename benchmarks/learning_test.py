@@ -20,6 +20,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Console
 
+from benchmarks.command import command
 from benchmarks.page_modules import ADD_A_METHOD, write_page_modules
 from benchmarks.rows import Row, markdown, read_rows, write_rows
 from bootifol.errors import BootifolError
@@ -75,6 +76,7 @@ METHODS: dict[str, tuple[str, Change]] = {
 COLUMNS = ("method", "seed", "agent_steps", "seconds", "episodes", "mean_return", "scaled_return")
 
 
+@command(resumes=True)
 def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -89,10 +91,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--runs", type=Path, required=True, help="where to keep the runs")
     parser.add_argument("--out", type=Path, default=Path("results/drawn_home/methods.csv"))
     arguments = parser.parse_args(words)
-    try:
-        compare(arguments)
-    except BootifolError as error:
-        sys.exit(f"error: {error}")
+    compare(arguments)
 
 
 def compare(arguments: argparse.Namespace) -> None:
@@ -145,7 +144,7 @@ def trained_rows(described: RunConfig, method: str, directory: Path) -> list[Row
     run = Run(described, directory, Console(quiet=True))
     described.write(directory, ["python", "-m", "benchmarks.learning_test"])
     if not run.learn():
-        raise SystemExit("interrupted; the same command goes on with this run")
+        raise KeyboardInterrupt  # Ctrl-C, which the run itself answers with a checkpoint
     run.finish()
     evaluated = [
         row
@@ -277,4 +276,4 @@ def draw_curves(rows: Sequence[Row], task: Task, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

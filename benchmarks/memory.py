@@ -25,7 +25,6 @@ import json
 import math
 import multiprocessing
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -40,6 +39,7 @@ import torch
 from rich.console import Console
 from scipy.stats import linregress
 
+from benchmarks.command import command
 from benchmarks.paper_size_demos import MB
 from benchmarks.process_memory import status_bytes
 from benchmarks.rows import markdown
@@ -281,7 +281,8 @@ def finished(words: Sequence[str]) -> None:
         raise BootifolError(f"`bootifol {' '.join(words)}` failed: its own message is above")
 
 
-def main(words: Sequence[str] | None = None) -> int:
+@command()
+def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -291,17 +292,12 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--steps", type=int, default=6000, help="agent steps of the small run")
     parser.add_argument("--small-task", default="drawn_home", help="what the small run learns")
     arguments = parser.parse_args(words)
-    try:
-        require_at_least(100, **{"--transitions": arguments.transitions})
-        require_at_least(1000, **{"--steps": arguments.steps})
-        run = run_of(arguments.task, arguments.preset, arguments.transitions)
-        filled = alone(stores, run, actions_of(build_environment(run, 1)))
-        print(stores_table(filled, alone(whole_process, run)), flush=True)
-        print(f"\n{growth_table(growth(arguments.small_task, arguments.steps))}")
-    except BootifolError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+    require_at_least(100, **{"--transitions": arguments.transitions})
+    require_at_least(1000, **{"--steps": arguments.steps})
+    run = run_of(arguments.task, arguments.preset, arguments.transitions)
+    filled = alone(stores, run, actions_of(build_environment(run, 1)))
+    print(stores_table(filled, alone(whole_process, run)), flush=True)
+    print(f"\n{growth_table(growth(arguments.small_task, arguments.steps))}")
 
 
 def alone(measure: Callable[..., Measured], *arguments: object) -> Measured:

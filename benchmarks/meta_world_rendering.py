@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from typing import Any, get_args
 
+from benchmarks.command import command
 from bootifol.envs.meta_world import CAMERA, MetaWorldSimulator, load_meta_world
 from bootifol.envs.pictures import PictureConfig, RenderProfile
 
@@ -26,6 +27,7 @@ def own_renderer(name: str, size: int) -> Callable[[], Any]:
     return render
 
 
+@command()
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--size", type=int, default=64, help="height and width of the pictures in pixels")
@@ -60,4 +62,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

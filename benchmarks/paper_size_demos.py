@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import resource
-import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -25,6 +24,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from benchmarks.command import command
 from benchmarks.process_memory import status_bytes
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
@@ -111,6 +111,7 @@ def recorded(task: str, size: Size, directory: Path, workers: int) -> str:
     return f"{described}, and at most {worker / MB:.0f} MB a worker"
 
 
+@command(resumes=True)
 def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -125,36 +126,31 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, default=Path("demos/paper_size"))
     arguments = parser.parse_args(words)
     size = SIZES[arguments.size]
+    if arguments.videos is not None:
+        size = Size(arguments.videos, size.agent_steps, size.picture)
+    require_at_least(1, **{"--videos": size.videos, "--memory": arguments.memory, "--batch": arguments.batch})
+    directory = arguments.out / f"{arguments.task}-{arguments.size}-{size.videos}"
+    print(recorded(arguments.task, size, directory, arguments.workers), flush=True)
+    on_disk = sum(file.stat().st_size for file in directory.iterdir())
+    print(f"{on_disk / 10**9:.3f} GB on disk in {directory}", flush=True)
+    same_size = size.picture == CPU.pictures.video_size
+    gradient_steps = arguments.gradient_steps if same_size else 0
     try:
-        if arguments.videos is not None:
-            size = Size(arguments.videos, size.agent_steps, size.picture)
-        require_at_least(
-            1, **{"--videos": size.videos, "--memory": arguments.memory, "--batch": arguments.batch}
-        )
-        directory = arguments.out / f"{arguments.task}-{arguments.size}-{size.videos}"
-        print(recorded(arguments.task, size, directory, arguments.workers), flush=True)
-        on_disk = sum(file.stat().st_size for file in directory.iterdir())
-        print(f"{on_disk / 10**9:.3f} GB on disk in {directory}", flush=True)
-        same_size = size.picture == CPU.pictures.video_size
-        gradient_steps = arguments.gradient_steps if same_size else 0
         with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as alone:
             reading = alone.submit(
                 read_within, directory, arguments.memory * MB, arguments.batch, gradient_steps
             ).result()
-        print(
-            f"drew {reading.videos} videos, {reading.videos * on_disk / size.videos / 10**9:.3f} GB, at "
-            f"{reading.videos / reading.seconds:.0f} a second, and took {gradient_steps} gradient steps of the reward "
-            f"on them; peak resident memory {reading.peak / MB:.0f} MB, of which {reading.before / MB:.0f} MB before "
-            f"the first batch (allowed beyond: {arguments.memory} MB)"
-        )
-    except BootifolError as error:
-        sys.exit(f"error: {error}")
     except (MemoryError, RuntimeError) as error:
-        sys.exit(
-            f"error: learning from {directory} within {arguments.memory} MB failed ({error}): "
-            "give it more with --memory"
-        )
+        raise BootifolError(
+            f"learning from {directory} within {arguments.memory} MB failed ({error}): give it more with --memory"
+        ) from error
+    print(
+        f"drew {reading.videos} videos, {reading.videos * on_disk / size.videos / 10**9:.3f} GB, at "
+        f"{reading.videos / reading.seconds:.0f} a second, and took {gradient_steps} gradient steps of the reward "
+        f"on them; peak resident memory {reading.peak / MB:.0f} MB, of which {reading.before / MB:.0f} MB before "
+        f"the first batch (allowed beyond: {arguments.memory} MB)"
+    )
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -14,9 +14,9 @@ from typing import Annotated
 
 import tyro
 
+from benchmarks.command import command
 from bootifol.cli.train import preset_of
 from bootifol.envs.rollout import Act
-from bootifol.errors import BootifolError
 from bootifol.evaluation.returns import EpisodeResult, evaluate, evaluation_rows
 from bootifol.evaluation.tables import append_evaluations
 from bootifol.experts import make_random
@@ -62,19 +62,14 @@ def play(
     report([out], out / "report.html")
 
 
-def main() -> int:
-    """The command: 0, or 2 after bad input, which one sentence explains."""
+@command()
+def main() -> None:
     words = sys.argv[1:]
-    try:
-        tyro.cli(
-            functools.partial(play, config=preset_of(words)),
-            args=words,
-            config=(tyro.conf.FlagConversionOff, tyro.conf.AvoidSubcommands),
-        )
-    except BootifolError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+    tyro.cli(
+        functools.partial(play, config=preset_of(words)),
+        args=words,
+        config=(tyro.conf.FlagConversionOff, tyro.conf.AvoidSubcommands),
+    )
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.command import command
 from benchmarks.resumable_table import ResumableTable
 from bootifol.agents.config import DrQv2Config
 from bootifol.envs.rollout import Act
@@ -93,6 +94,7 @@ VARIANTS: dict[str, Callable[[TrainingConfig], TrainingConfig]] = {
 COLUMNS = ("variant", "seed", "seconds", "agent_steps", "mean_return", "scaled_return")
 
 
+@command(resumes=True)
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -145,7 +147,7 @@ def trained(arguments: argparse.Namespace, variant: str, seed: int, directory: P
     run = Run(described, directory, Console(quiet=True))
     described.write(directory, ["python", "-m", "benchmarks.remedies"])
     if not run.learn():
-        raise SystemExit("interrupted; the same command goes on with this run")
+        raise KeyboardInterrupt  # Ctrl-C, which the run itself answers with a checkpoint
     agent, counters = run.components.agent, run.counters
     act: Act = lambda observation: agent.act(observation, 0, explore=False)  # noqa: E731
     task = task_named(arguments.task)
@@ -180,4 +182,4 @@ def table(rows: list[dict[str, str]]) -> Table:
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -22,12 +22,11 @@ from pathlib import Path
 from statistics import mean
 
 from benchmarks.run_state import check_is_planned, error_file, log_file, run_state
-from benchmarks.suites import RANDOM, VIDEOS, PlannedRun, tasks_of
+from benchmarks.suites import RANDOM, VIDEOS, PlannedRun, demos_of
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.progress import duration
-from bootifol.tasks import short_name
 from bootifol.training.budget import parse_duration
 from bootifol.training.config import TrainingConfig
 from bootifol.training.interruption import Interruption
@@ -68,7 +67,7 @@ class RunQueue:
     Args:
         runs: in the order to begin them.
         out: directory of the suite.
-        demos: directory of the demo sets, one a task; missing ones are recorded.
+        demos: directory of the demo sets, one a task and size of its videos; missing ones are recorded.
         workers: runs side by side, each on a core of its own.
         time_budget: of each run, such as "60m"; None for the agent steps of its configuration.
         videos: expert videos to record where there are none; by default what the preset wants.
@@ -144,20 +143,20 @@ class RunQueue:
         return self.outcome()
 
     def _with_demos(self, runs: list[PlannedRun], interruption: Interruption, lock: int) -> list[PlannedRun]:
-        """The runs whose task has its videos; missing ones are recorded first, and where that fails, the runs fail."""
+        """The runs that have their videos; missing ones are recorded first, and where that fails, the runs fail."""
         ready = list(runs)
-        for task, run in tasks_of(runs).items():
-            directory = self.demos / short_name(task)
+        for name, run in demos_of(runs).items():
+            directory = self.demos / name
             missing = missing_demos(directory)
             if not missing:
                 continue
-            self.say(f"recording  {', '.join(missing)} videos of {task} in {directory}")
+            self.say(f"recording  {', '.join(missing)} videos of {run.task} in {directory}")
             error = self._record(run, directory, missing, interruption, lock)
             if interruption.requested:
                 self.say("stopped    the same command goes on with the recording")
                 return []
             if error:
-                for failed in [other for other in ready if other.task == task]:
+                for failed in [other for other in ready if other.demos_name == name]:
                     self._fail(failed, f"its videos could not be recorded: {error}", log_file(directory))
                     ready.remove(failed)
         return ready
@@ -189,7 +188,7 @@ class RunQueue:
         directory = self.directory(run)
         resumes = (directory / "config.json").is_file()
         error_file(directory).unlink(missing_ok=True)
-        words = run.words(self.demos / short_name(run.task), directory, self.time_budget)
+        words = run.words(self.demos / run.demos_name, directory, self.time_budget)
         command = [*self.program, "train", *words]
         if run.system.method == RANDOM:
             command = [sys.executable, "-m", "benchmarks.random_policy", *words]

@@ -18,7 +18,6 @@ import io
 import math
 import shutil
 import statistics
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -33,6 +32,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from benchmarks.command import command
 from benchmarks.engine import (
     FRAMES,
     RandomVideos,
@@ -325,7 +325,8 @@ def draw_panel(axes: Axes, panel: Panel, found: Mapping[str, Curve], stages: Seq
         axes.plot(ends, line, color=FAINT, linestyle=(0, (5, 3)), linewidth=1.0, label="slope 1")
 
 
-def main(words: Sequence[str] | None = None) -> int:
+@command(resumes=True)
+def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -338,29 +339,24 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--picture", type=Path, help="a PNG file")
     arguments = parser.parse_args(words)
     keep_freed_memory()
-    try:
-        require_at_least(1, **{"--threads": arguments.threads, "--runs": arguments.runs})
-        torch.set_num_threads(arguments.threads)
-        table = ResumableTable(arguments.out, COLUMNS, KEY)
-        measure(
-            table,
-            arguments.panels,
-            arguments.preset,
-            arguments.threads,
-            arguments.runs,
-            arguments.scratch,
-        )
-        # One file may hold several presets and thread counts; a picture and its tables show one.
-        shown = (arguments.preset, str(arguments.threads))
-        rows = [line for line in table.rows if (line["preset"], line["threads"]) == shown]
-        print("\n\n".join(tables(rows)))
-        if arguments.picture is not None:
-            arguments.picture.parent.mkdir(parents=True, exist_ok=True)
-            print(f"\nfigure: {save_png(drawn(rows), arguments.picture)}")
-    except BootifolError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+    require_at_least(1, **{"--threads": arguments.threads, "--runs": arguments.runs})
+    torch.set_num_threads(arguments.threads)
+    table = ResumableTable(arguments.out, COLUMNS, KEY)
+    measure(
+        table,
+        arguments.panels,
+        arguments.preset,
+        arguments.threads,
+        arguments.runs,
+        arguments.scratch,
+    )
+    # One file may hold several presets and thread counts; a picture and its tables show one.
+    shown = (arguments.preset, str(arguments.threads))
+    rows = [line for line in table.rows if (line["preset"], line["threads"]) == shown]
+    print("\n\n".join(tables(rows)))
+    if arguments.picture is not None:
+        arguments.picture.parent.mkdir(parents=True, exist_ok=True)
+        print(f"\nfigure: {save_png(drawn(rows), arguments.picture)}")
 
 
 if __name__ == "__main__":

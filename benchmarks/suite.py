@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import argparse
 import fnmatch
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.command import command
 from benchmarks.run_queue import PROGRAM, RunQueue
 from benchmarks.run_state import run_state
 from benchmarks.suites import SUITES, PlannedRun, named
@@ -24,6 +24,7 @@ from bootifol.errors import BootifolError
 from bootifol.presets import PRESETS
 
 
+@command(resumes=True)
 def main(words: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) -> int:
     """The command.
 
@@ -35,14 +36,7 @@ def main(words: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) -
         0 when every run is done, 1 when some are not, 2 after bad input, 130 after a second Ctrl-C.
     """
     arguments = parser().parse_args(words)
-    try:
-        return _work(arguments, program)
-    except BootifolError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on from the last checkpoints", file=sys.stderr)
-        return 130
+    return _work(arguments, program)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -54,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("name", metavar="NAME", help="of the suite")
     made.add_argument("--out", type=Path, help="directory of the runs (runs/NAME)")
     made.add_argument(
-        "--demos", type=Path, default=Path("demos"), help="directory of the videos, one a task (demos)"
+        "--demos", type=Path, default=Path("demos"), help="directory of the videos, one set a task (demos)"
     )
     made.add_argument(
         "--workers", type=int, default=1, help="runs side by side, each on a core of its own (1)"

@@ -1,7 +1,8 @@
 """What the paper compares, as lists of runs: systems, tasks and seeds under equal terms.
 
 A run is one `bootifol train` command. All runs of a task learn from the same videos, with the same agent, budget and
-evaluation; what a system changes of its preset is written here and nowhere else.
+evaluation; what a system changes of its preset is written here and nowhere else. One system reads the videos at another
+size, and with the paper's sizes it has a preset of its own: `with_backbone`.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from bootifol.errors import BootifolError
-from bootifol.presets import PAPER, preset
-from bootifol.reports.paper_results import RETURNS
+from bootifol.presets import BACKBONE, PAPER, preset
+from bootifol.reports.paper_results import META_WORLD, RETURNS
 from bootifol.tasks import short_name, task_named
 from bootifol.training.config import TrainingConfig
 
@@ -38,11 +39,21 @@ class System:
     method: str
     variant: str = ""
     overrides: Overrides = ()
+    preset: str = ""
+    """Its own; empty for the suite's."""
+    video_size: int | None = None
+    """Height and width in pixels where it reads videos of a size of its own, which have a directory of their own."""
+    tasks: tuple[str, ...] = ()
+    """The only ones that it is compared on; empty for all."""
 
     @property
     def name(self) -> str:
         """METHOD or METHOD-VARIANT."""
         return f"{self.method}-{self.variant}" if self.variant else self.method
+
+    def is_compared_on(self, task: str) -> bool:
+        """Whether the task is one of its own."""
+        return not self.tasks or task in self.tasks
 
 
 @dataclass(frozen=True)
@@ -58,6 +69,12 @@ class PlannedRun:
     def name(self) -> str:
         """TASK/METHOD[-VARIANT]/seedN, also its directory."""
         return f"{short_name(self.task)}/{self.system.name}/seed{self.seed}"
+
+    @property
+    def demos_name(self) -> str:
+        """TASK[-SIZE], the directory of its videos."""
+        size = self.system.video_size
+        return short_name(self.task) if size is None else f"{short_name(self.task)}-{size}"
 
     @property
     def config(self) -> TrainingConfig:
@@ -103,6 +120,7 @@ def every_system(config: TrainingConfig, timed: bool) -> list[System]:
     return [
         System("bootifol"),
         System("bootifol", "cosine", cosine),
+        *(dataclasses.replace(system, tasks=tuple(META_WORLD.tasks)) for system in with_backbone(config)),
         System("virl"),
         System("gaifo"),
         System("context_translation", "n1", ((references, 1),)),
@@ -110,6 +128,29 @@ def every_system(config: TrainingConfig, timed: bool) -> list[System]:
         System("environment"),
         System(RANDOM),
     ]
+
+
+def with_backbone(config: TrainingConfig) -> list[System]:
+    """The paper's Eff-BootIfOL, whose frozen pretrained backbone reads videos of 224x224 pixels.
+
+    With the preset `paper` it is the preset `backbone`. Elsewhere it has EfficientNet-Lite0, whose weights come in a
+    package, and all else as the preset has it.
+
+    Returns:
+        It alone; nothing where the preset has a backbone, so that `bootifol` is Eff-BootIfOL already.
+    """
+    if config.reward.bootifol.backbone is not None:
+        return []
+    size = BACKBONE.pictures.video_size
+    if config == PAPER:
+        return [System("bootifol", "backbone", preset="backbone", video_size=size)]
+    lite = (("reward.bootifol.backbone", "efficientnet_lite0"), ("pictures.video_size", size))
+    return [System("bootifol", "backbone", lite, video_size=size)]
+
+
+def backbone_comparison(config: TrainingConfig, timed: bool) -> list[System]:
+    """The paper's method from scratch, and with a pretrained backbone, on any task."""
+    return [System("bootifol"), *with_backbone(config)]
 
 
 def alignment_ablation(config: TrainingConfig, timed: bool) -> list[System]:
@@ -212,15 +253,16 @@ class Suite:
         name = preset_name or self.preset
         systems = self.systems(preset(name), timed)
         runs = [
-            PlannedRun(task, name, system, seed)
+            PlannedRun(task, system.preset or name, system, seed)
             for seed in seeds or self.seeds
             for task in tasks or self.tasks
             for system in systems
+            if system.is_compared_on(task)
         ]
         for task in tasks or self.tasks:
             task_named(task)
         for system in systems:
-            with_overrides(preset(name), system.overrides)
+            with_overrides(preset(system.preset or name), system.overrides)
         return runs
 
 
@@ -240,6 +282,13 @@ SUITES = {
     ),
     "cpu": Suite(
         "the same with the preset cpu, about an hour a run", "cpu", SEVEN_TASKS, FIVE_SEEDS, every_system
+    ),
+    "backbone": Suite(
+        "bootifol from scratch and with a pretrained backbone on Drawer Close",
+        "cpu",
+        ("drawer_close",),
+        (1,),
+        backbone_comparison,
     ),
     "alignment": _ablation(
         "ablation: with, without, and without the Alignment Phase but trained to the end",
@@ -278,9 +327,9 @@ def named(name: str) -> Suite:
     return SUITES[name]
 
 
-def tasks_of(runs: Iterable[PlannedRun]) -> dict[str, PlannedRun]:
-    """The tasks of some runs, each with its first run, which says how its videos must look."""
+def demos_of(runs: Iterable[PlannedRun]) -> dict[str, PlannedRun]:
+    """The directories of videos of some runs, each with its first run, which says how its videos must look."""
     first: dict[str, PlannedRun] = {}
     for run in runs:
-        first.setdefault(run.task, run)
+        first.setdefault(run.demos_name, run)
     return first

@@ -7,16 +7,17 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
+from benchmarks.command import command
 from benchmarks.table_command import write_table
 from bootifol.reports.paper_results import DM_CONTROL
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    return write_table(__doc__, DM_CONTROL, arguments)
+@command()
+def main(arguments: Sequence[str] | None = None) -> None:
+    write_table(__doc__, DM_CONTROL, arguments)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -16,7 +16,6 @@ measured again, so the same command goes on where it stopped. Tasks without an e
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,6 +25,7 @@ import torch
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from benchmarks.command import command
 from benchmarks.rows import Row, markdown, read_rows, write_rows
 from bootifol.demos.record import HALF_GOOD_VIDEOS, record_demos
 from bootifol.errors import BootifolError, require_at_least
@@ -244,6 +244,7 @@ def draw_areas(axes: Axes, rows: Sequence[Row]) -> None:
     axes.legend(loc="upper center", bbox_to_anchor=(0.4, 1.2), ncols=2, fontsize=7.5, handletextpad=0.2)
 
 
+@command(resumes=True)
 def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -264,33 +265,30 @@ def main(words: Sequence[str] | None = None) -> None:
     arguments = parser.parse_args(words)
     keep_freed_memory()
     torch.set_num_threads(arguments.threads)
-    try:
-        # One number would do in all, but one video of a kind has no spread.
-        require_at_least(2, **{"--videos": arguments.videos, "--held-out": arguments.held_out})
-        if arguments.held_out > HALF_GOOD_VIDEOS:
-            raise BootifolError(
-                f"--held-out is at most {HALF_GOOD_VIDEOS}, as many half-good videos as are recorded, "
-                f"not {arguments.held_out}"
-            )
-        tasks = [TASKS[name] for name in arguments.tasks]
-        steps = arguments.gradient_steps
-        steps = preset(arguments.preset).alignment.gradient_steps if steps is None else steps
-        setup = Setup(arguments.preset, steps, arguments.videos, arguments.held_out, arguments.seed)
-        for task in tasks:
-            if not task.has_expert:
-                print(f"{task.name} is left out: no expert is bundled yet, so there are no videos to rank")
-        tasks = [task for task in tasks if task.has_expert]
-        if not tasks:
-            return
-        rewards = rank_all(tasks, setup, arguments.demos, arguments.workers, arguments.out)
-        rows = [row for row in read_rows(arguments.out, COLUMNS) if row["task"] in rewards]
-        print(report(rows))
-        if arguments.picture is not None:
-            draw(rewards, rows, arguments.picture)
-            print(arguments.picture)
-    except BootifolError as error:
-        sys.exit(f"error: {error}")
+    # One number would do in all, but one video of a kind has no spread.
+    require_at_least(2, **{"--videos": arguments.videos, "--held-out": arguments.held_out})
+    if arguments.held_out > HALF_GOOD_VIDEOS:
+        raise BootifolError(
+            f"--held-out is at most {HALF_GOOD_VIDEOS}, as many half-good videos as are recorded, "
+            f"not {arguments.held_out}"
+        )
+    tasks = [TASKS[name] for name in arguments.tasks]
+    steps = arguments.gradient_steps
+    steps = preset(arguments.preset).alignment.gradient_steps if steps is None else steps
+    setup = Setup(arguments.preset, steps, arguments.videos, arguments.held_out, arguments.seed)
+    for task in tasks:
+        if not task.has_expert:
+            print(f"{task.name} is left out: no expert is bundled yet, so there are no videos to rank")
+    tasks = [task for task in tasks if task.has_expert]
+    if not tasks:
+        return
+    rewards = rank_all(tasks, setup, arguments.demos, arguments.workers, arguments.out)
+    rows = [row for row in read_rows(arguments.out, COLUMNS) if row["task"] in rewards]
+    print(report(rows))
+    if arguments.picture is not None:
+        draw(rewards, rows, arguments.picture)
+        print(arguments.picture)
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

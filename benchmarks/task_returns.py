@@ -16,14 +16,14 @@ expert has a sentence in place of numbers.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.command import command
 from benchmarks.rows import Row, markdown, read_rows, write_rows
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.errors import require_at_least
 from bootifol.evaluation.returns import EpisodeResult, behavior_results, unseen_environment
 from bootifol.evaluation.summary import summarize
 from bootifol.experts import Behavior
@@ -167,6 +167,7 @@ def report(tasks: Sequence[Task], rows: Sequence[Row]) -> str:
     return "\n\n".join([*parts, *notes])
 
 
+@command(resumes=True)
 def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -177,13 +178,10 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--episodes", type=int, default=50)
     parser.add_argument("--out", type=Path, default=Path("results/tasks/returns.csv"))
     arguments = parser.parse_args(words)
-    try:
-        require_at_least(1, **{"--episodes": arguments.episodes})
-        tasks = [TASKS[name] for name in arguments.tasks]
-        print(report(tasks, measure_all(tasks, arguments.episodes, arguments.out)))
-    except BootifolError as error:
-        sys.exit(f"error: {error}")
+    require_at_least(1, **{"--episodes": arguments.episodes})
+    tasks = [TASKS[name] for name in arguments.tasks]
+    print(report(tasks, measure_all(tasks, arguments.episodes, arguments.out)))
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 from benchmarks.run_queue import RunQueue, cores, missing_demos, record_words, what_went_wrong
 from benchmarks.run_state import run_state
-from benchmarks.suites import PlannedRun, System
+from benchmarks.suites import PlannedRun, System, backbone_comparison
 from fake_program import write_config, write_end
 
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
-from bootifol.presets import BACKBONE, CPU
+from bootifol.presets import BACKBONE, CPU, SMOKE
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_program.py")))
 
@@ -130,6 +130,16 @@ def test_videos_are_as_long_as_the_runs_want_them() -> None:
     options = dict(itertools.pairwise(words))
     assert (options["--episode-steps"], options["--video-size"], options["--episodes"]) == ("50", "224", "3")
     assert "--episode-steps" not in record_words("reacher_hard", CPU, Path("demos"), 3, ["expert"])
+
+
+def test_a_backbone_has_larger_videos_in_a_directory_of_their_own(suite: Path) -> None:
+    runs = [PlannedRun("drawn_home", "smoke", system, 1) for system in backbone_comparison(SMOKE, False)]
+    assert queue(suite, runs).work().done == 2
+    recorded = [line for line in (suite / "calls.txt").read_text().splitlines() if line.startswith("record")]
+    assert recorded == ["record drawn_home 12 at 64", "record drawn_home 12 at 224"]
+    for run, demos in zip(runs, ("drawn_home", "drawn_home-224"), strict=True):
+        log = (suite / "out" / f"{run.name}.log").read_text()
+        assert f"--demos {suite / 'demos' / demos} " in log
 
 
 def test_imported_videos_are_used_and_random_ones_recorded_beside_them(suite: Path, demo_set: Path) -> None:

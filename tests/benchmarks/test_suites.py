@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import tyro
 from benchmarks.suite import main
-from benchmarks.suites import SUITES, VIDEOS, PlannedRun, equivalent_steps, tasks_of, with_overrides
+from benchmarks.suites import SUITES, VIDEOS, PlannedRun, demos_of, equivalent_steps, with_overrides
 from fake_program import write_config, write_end
 
 from bootifol.errors import BootifolError
-from bootifol.presets import CPU, PAPER, PRESETS, SMOKE
+from bootifol.evaluation.tables import EvaluationRow, append_evaluations
+from bootifol.presets import BACKBONE, CPU, PAPER, PRESETS, preset
+from bootifol.reports.paper_results import RETURNS
+from bootifol.reports.result_tables import result_tables
+from bootifol.reports.run_files import find_runs, read_run
 from bootifol.training.config import TrainingConfig
+from bootifol.training.run_config import RunConfig
 
 
 def runs_of(name: str) -> list[PlannedRun]:
@@ -21,11 +27,16 @@ def runs_of(name: str) -> list[PlannedRun]:
 
 
 @pytest.mark.parametrize("name", SUITES)
-def test_runs_have_names_of_their_own_and_share_their_tasks_videos(name: str) -> None:
+def test_runs_have_names_of_their_own_and_videos_that_suit_all_who_share_them(name: str) -> None:
     runs = runs_of(name)
     assert len({run.name for run in runs}) == len(runs)
-    pictures = {task: run.config.pictures for task, run in tasks_of(runs).items()}
-    assert all(run.config.pictures == pictures[run.task] for run in runs)
+    demos = {
+        name: (run.config.pictures, run.config.episode_steps, run.preset)
+        for name, run in demos_of(runs).items()
+    }
+    assert all(
+        (run.config.pictures, run.config.episode_steps, run.preset) == demos[run.demos_name] for run in runs
+    )
 
 
 def parsed(words: list[str], preset: TrainingConfig) -> TrainingConfig:
@@ -33,20 +44,79 @@ def parsed(words: list[str], preset: TrainingConfig) -> TrainingConfig:
     return tyro.cli(TrainingConfig, default=preset, args=words, config=(tyro.conf.FlagConversionOff,))
 
 
-@pytest.mark.parametrize("name", ["reacher", "alignment", "encoder_training", "policy_input", "smoke"])
+@pytest.mark.parametrize(
+    "name", ["reacher", "backbone", "alignment", "encoder_training", "policy_input", "smoke"]
+)
 def test_the_words_of_a_run_say_what_its_configuration_is(name: str) -> None:
     for run in runs_of(name)[: len(SUITES[name].systems(CPU, False))]:
         words = run.words(Path("demos"), Path("out"), None)
-        assert words[:4] == ["--task", run.task, "--method", run.system.method]
-        preset = SMOKE if run.preset == "smoke" else CPU
-        assert parsed(words[words.index("--threads") :], preset) == run.config
+        assert words[:6] == ["--task", run.task, "--method", run.system.method, "--preset", run.preset]
+        assert parsed(words[words.index("--threads") :], preset(run.preset)) == run.config
 
 
 def test_the_papers_tables_have_five_seeds_of_everything() -> None:
     runs = runs_of("paper")
-    assert len(runs) == 7 * 8 * 5
-    assert {run.seed for run in runs[: 7 * 8]} == {1}  # the first seed of everything comes first
+    one_seed = 7 * 8 + 3  # a backbone on the three tasks of Meta-World
+    assert len(runs) == one_seed * 5
+    assert {run.seed for run in runs[:one_seed]} == {1}  # the first seed of everything comes first
     assert runs[0].config == with_overrides(PAPER, (("threads", 1),))
+
+
+def backbones(name: str) -> list[PlannedRun]:
+    """The runs of a suite that have one, of the first seed."""
+    return [run for run in runs_of(name) if run.system.variant == "backbone" and run.seed == 1]
+
+
+def test_a_backbone_stands_beside_the_papers_numbers() -> None:
+    with_number = [task for task, agents in RETURNS.items() if "Eff-BootIfOL" in agents]
+    assert [run.task for run in backbones("paper")] == with_number
+    assert [run.task for run in backbones("cpu")] == with_number
+    assert [run.name for run in backbones("backbone")] == ["drawer_close/bootifol-backbone/seed1"]
+    assert not backbones("reacher")
+
+
+def test_a_backbone_has_the_papers_preset_or_weights_that_are_there_already() -> None:
+    papers, small = backbones("paper")[0], backbones("cpu")[0]
+    assert (papers.preset, papers.demos_name) == ("backbone", "button_press-224")
+    assert papers.config == replace(BACKBONE, threads=1)
+    lite = replace(CPU.reward.bootifol, backbone="efficientnet_lite0")
+    assert small.config.reward.bootifol == lite
+    assert small.config.pictures == replace(CPU.pictures, video_size=224)
+    alone = SUITES["backbone"].runs("backbone")
+    assert [run.system.name for run in alone] == ["bootifol"], "the preset has a backbone already"
+
+
+@pytest.mark.parametrize("name", ["paper", "cpu", "backbone"])
+def test_a_backbone_has_the_papers_row_of_the_table(tmp_path: Path, name: str) -> None:
+    from_scratch, with_backbone = (
+        next(
+            run
+            for run in runs_of(name)
+            if (run.task, run.system.method, run.system.variant) == ("drawer_close", "bootifol", variant)
+        )
+        for variant in ("", "backbone")
+    )
+    finished(from_scratch, tmp_path, 0.4)
+    finished(with_backbone, tmp_path, 0.8)
+    scaled = result_tables([read_run(directory) for directory in find_runs([tmp_path])]).tables[0]
+    rows = [
+        (row.agent, row.summary and row.summary.mean, row.paper and row.paper.scaled) for row in scaled.rows
+    ]
+    assert rows == [("Eff-BootIfOL", 0.8, 0.91), ("BootIfOL", 0.4, 0.53)]
+
+
+def finished(run: PlannedRun, out: Path, scaled: float) -> None:
+    """What tables read of a run that has ended, with one final episode."""
+    directory = out / run.name
+    directory.mkdir(parents=True)
+    config = replace(run.config, evaluation=replace(run.config.evaluation, final_episodes=1))
+    RunConfig(run.task, run.system.method, run.preset, run.seed, "demos", None, config).write(directory, [])
+    steps = config.interactive.agent_steps
+    end = EvaluationRow(steps, 60.0, 500, 0, 7, 1000 * scaled, scaled, None)
+    append_evaluations(directory / "evaluations.csv", [end])
+    (directory / "metrics.jsonl").write_text(
+        f'{{"phase": "interactive", "agent_steps": {steps}, "seconds": 60.0}}\n'
+    )
 
 
 def test_encoder_training_lengths_are_the_papers_or_the_same_shares() -> None:
@@ -94,6 +164,16 @@ def test_list_prints_runs_and_runs_nothing(tmp_path: Path, capsys: pytest.Captur
     virl, gaifo = capsys.readouterr().out.splitlines()
     assert virl.split() == ["reacher_hard/virl/seed1", "done:", "240", "agent", "steps,", "9", "s"]
     assert gaifo.split() == ["reacher_hard/gaifo/seed1", "not", "begun"]
+
+
+def test_list_shows_the_backbone_beside_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["backbone", "--out", str(tmp_path), "--list"]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [
+        "drawer_close/bootifol/seed1",
+        "drawer_close/bootifol-backbone/seed1",
+    ]
 
 
 @pytest.mark.parametrize(

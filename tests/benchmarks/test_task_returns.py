@@ -38,7 +38,9 @@ def test_expert_half_good_and_random_in_their_order(
     assert f"| `drawn_home` | {expert['mean_return']:.1f} ({expert['return_low']:.1f} … " in printed
 
 
-def test_it_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_goes_on_where_it_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     out, played = tmp_path / "returns.csv", []
     measured = task_returns.measured
 
@@ -50,9 +52,9 @@ def test_it_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(task_returns, "measured", interrupted_at_the_third)
     words = ["--tasks", "drawn_home", "--episodes", "1", "--out", str(out)]
-    with pytest.raises(KeyboardInterrupt):
-        main(words)
+    assert main(words) == 130
     assert len(read(out)) == 2
+    assert "the same command goes on" in capsys.readouterr().err
     main(words)
     assert played[2:] == [("random", 60), ("random", 60), ("expert", 30)]
     main(words)
@@ -90,10 +92,10 @@ def test_meta_world_is_also_measured_within_its_own_limit() -> None:
     assert "| `button_press` | – | 169.2 (150.0 … 180.0) |" in printed
 
 
-def test_bad_words_give_a_sentence(tmp_path: Path) -> None:
+def test_bad_words_give_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "returns.csv"
-    with pytest.raises(SystemExit, match="error: --episodes must be at least 1"):
-        main(["--episodes", "0", "--out", str(out)])
+    assert main(["--episodes", "0", "--out", str(out)]) == 2
+    assert "error: --episodes must be at least 1" in capsys.readouterr().err
     out.write_text("a,b\n")
-    with pytest.raises(SystemExit, match="is another table"):
-        main(["--tasks", "drawn_home", "--out", str(out)])
+    assert main(["--tasks", "drawn_home", "--out", str(out)]) == 2
+    assert "is another table" in capsys.readouterr().err

@@ -45,7 +45,7 @@ def test_the_table_judges_the_last_evaluation_of_each_seed() -> None:
 
 
 def test_it_trains_evaluates_and_goes_on_where_it_stopped(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "path", list(sys.path))
     few = replace(DRAWN, evaluation=replace(DRAWN.evaluation, final_episodes=8))
@@ -74,5 +74,6 @@ def test_it_trains_evaluates_and_goes_on_where_it_stopped(
     monkeypatch.delattr(learning_test, "Run")  # what is done is not done again
     learning_test.main(tiny)
     assert read_rows(tmp_path / "m.csv", learning_test.COLUMNS) == rows
-    with pytest.raises(SystemExit, match=r"error: .*virl-seed1 holds another run"):
-        learning_test.main([*words, "--agent-steps", "90", "--seeds", "1", "--methods", "virl"])
+    capsys.readouterr()
+    assert learning_test.main([*words, "--agent-steps", "90", "--seeds", "1", "--methods", "virl"]) == 2
+    assert "virl-seed1 holds another run: choose" in capsys.readouterr().err

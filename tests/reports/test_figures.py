@@ -18,6 +18,7 @@ from benchmarks import (
     table_meta_world,
 )
 from bootifol.errors import BootifolError
+from bootifol.evaluation.tables import EvaluationRow, append_evaluations
 from bootifol.reports.comparison import Comparison, compare
 from bootifol.reports.figures import Loss, losses_figure, over_seeds, returns_figure
 from bootifol.reports.film_strip import expert_above_agent
@@ -77,6 +78,19 @@ def test_episodes_of_different_lengths_are_not_drawn_together(tmp_path: Path) ->
     write_run(tmp_path / "b", method="virl")
     with pytest.raises(BootifolError, match="episodes differ in length"):
         returns_figure(comparison_of(tmp_path))
+
+
+def test_agents_with_other_training_episodes_are_drawn_by_longer_ones_that_all_have(tmp_path: Path) -> None:
+    for name, length, backbone in (("a", 60, None), ("b", 50, "google/efficientnet-b0")):
+        run_dir = write_run(tmp_path / name, curve=CURVE, reward__bootifol__backbone=backbone)
+        evaluations = run_dir / "evaluations.csv"
+        evaluations.write_text(evaluations.read_text().replace(",60,", f",{length},"))
+        append_evaluations(evaluations, [EvaluationRow(100, 6.0, 500, 0, 7, float(length), None, None)])
+    axes = returns_figure(comparison_of(tmp_path)).axes[0]
+    assert axes.get_ylabel() == "return of 500-step episodes"
+    assert [line.get_label() for line in axes.lines] == ["BootIfOL, 1 seed", "Eff-BootIfOL, 1 seed"]
+    # The mean of the final episodes, 40 and 60, comes last.
+    assert points(axes, 1) == pytest.approx(np.array([(100.0, 50.0), (1000.0, 50.0)]))
 
 
 def test_a_loss_may_be_the_sum_of_two(tmp_path: Path) -> None:

@@ -72,8 +72,8 @@ def over_seeds(curves: Sequence[Curve]) -> Band:
 def returns_figure(comparison: Comparison, by_time: bool = False) -> Figure:
     """Average return of evaluation episodes while agents learn: a panel a task, a line an agent.
 
-    The episodes are the shortest that were evaluated (60 agent steps in the paper). With one seed the band is the
-    interval over its episodes.
+    The episodes are the shortest that were evaluated (60 agent steps in the paper); where agents of a task differ in
+    that, the shortest that all of them have a curve of. With one seed the band is the interval over its episodes.
 
     Args:
         comparison: the agents.
@@ -181,16 +181,23 @@ def require_groups(comparison: Comparison) -> None:
 
 
 def _common_length(groups: Sequence[Group]) -> int:
-    """Agent steps of the shortest evaluation episodes, which must be the same for all."""
+    """Agent steps of the shortest evaluation episodes; where they differ, of the shortest that all have a curve of."""
+    runs = [run for group in groups for run in group.runs]
     lengths: dict[int, RunFiles] = {}
-    for run in (run for group in groups for run in group.runs):
+    for run in runs:
         if not run.episode_lengths():
             raise BootifolError(f"{run.path} has no evaluations; let it train longer, or leave it out")
         lengths.setdefault(run.episode_lengths()[0], run)
-    if len(lengths) > 1:
+    if len(lengths) == 1:
+        return next(iter(lengths))
+    curves = [
+        {length for length in run.episode_lengths() if len(run.evaluations_of(length)) > 1} for run in runs
+    ]
+    shared = set.intersection(*curves)
+    if not shared:
         told = ", ".join(f"{length} agent steps in {run.path}" for length, run in lengths.items())
         raise BootifolError(f"evaluation episodes differ in length ({told}); draw these runs apart")
-    return next(iter(lengths))
+    return min(shared)
 
 
 def _returns(group: Group, length: int, by_time: bool) -> Band:
