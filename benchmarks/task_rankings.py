@@ -27,6 +27,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.command import command
 from benchmarks.rows import Row, markdown, read_rows, write_rows
+from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.record import HALF_GOOD_VIDEOS, record_demos
 from bootifol.errors import BootifolError, require_at_least
 from bootifol.evaluation.ranking import (
@@ -39,6 +40,7 @@ from bootifol.evaluation.ranking import (
     ranking_scores,
 )
 from bootifol.evaluation.tables import RankingRow
+from bootifol.experts.behaviors import Behavior
 from bootifol.memory import keep_freed_memory
 from bootifol.presets import preset
 from bootifol.progress import progress
@@ -46,7 +48,7 @@ from bootifol.reports.paper_results import RETURNS
 from bootifol.reports.style import KIND_COLORS, KIND_NAMES, house_style, save_png
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.tasks import TASKS, Task
-from bootifol.types import Video
+from bootifol.types import Video, VideoSource
 
 SETTINGS = ("preset", "gradient_steps", "training_videos", "held_out_videos", "seed")
 MEASURES = ("kendall_tau", "expert_above_half_good", "half_good_above_random", "expert_above_random")
@@ -81,6 +83,16 @@ class Setup:
 
 def ranked(task: Task, setup: Setup, demos: Path, workers: int) -> list[RankingRow]:
     """Records what is missing, aligns the reward, and rewards the held-out videos."""
+    training, held_out = recorded(task, setup, demos, workers)
+    model = aligned(task, setup, training["expert"], training["random"])
+    rng = np.random.default_rng(setup.seed)
+    return rank_videos(model, held_out, training["expert"], rng, agent_steps=0)
+
+
+def recorded(
+    task: Task, setup: Setup, demos: Path, workers: int
+) -> tuple[dict[Behavior, DemoSet], dict[str, list[Video]]]:
+    """Expert and random videos to learn from, and held-out ones by kind; recorded where they are missing."""
     config = preset(setup.preset)
     training = record_demos(
         task.name,
@@ -108,14 +120,19 @@ def ranked(task: Task, setup: Setup, demos: Path, workers: int) -> list[RankingR
         ]
         for kind, videos in aside.items()
     }
+    return training, held_out
+
+
+def aligned(task: Task, setup: Setup, expert: VideoSource, random: VideoSource) -> BootifolRewardModel:
+    """The preset's reward model after its alignment on these videos."""
+    config = preset(setup.preset)
     model = BootifolRewardModel(config.reward.bootifol, config.pictures.video_size, setup.seed)
-    steps = model.align(training["expert"], training["random"])
+    steps = model.align(expert, random)
     with progress(f"{task.name}, aligning", setup.gradient_steps) as advance:
         for _ in range(setup.gradient_steps):
             metrics = next(steps)
             advance(1, sequence_loss=metrics["loss/sequence"])
-    rng = np.random.default_rng(setup.seed)
-    return rank_videos(model, held_out, training["expert"], rng, agent_steps=0)
+    return model
 
 
 def rank_all(
