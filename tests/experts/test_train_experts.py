@@ -13,6 +13,7 @@ from bootifol.errors import BootifolError
 from bootifol.experts.policy import StatePolicy
 from bootifol.experts.states import StateEnvironment
 from bootifol.experts.train import ExpertConfig, extract_policy, train_expert
+from bootifol.files import read_arrays
 from bootifol.tasks import TASKS
 
 pytest.importorskip("sb3_contrib")
@@ -97,3 +98,12 @@ def test_states_and_pictures_start_alike() -> None:
 def test_a_task_without_states_gets_a_sentence() -> None:
     with pytest.raises(BootifolError, match="has no states"):
         StateEnvironment("drawn_home", 20)
+
+
+@pytest.mark.usefixtures("short_episodes")
+def test_training_episodes_may_be_shorter_than_those_that_are_evaluated(tmp_path: Path) -> None:
+    train_expert(replace(CONFIG, agent_steps=30, episode_steps=7), tmp_path)
+    stored = read_arrays(tmp_path / "checkpoint" / "arrays.safetensors", "the checkpoint")
+    assert np.flatnonzero(stored["replay/timeouts"]).tolist() == [6, 13, 20, 27]
+    with pytest.raises(BootifolError, match="episode_steps must be at least 1, not 0"):
+        replace(CONFIG, episode_steps=0)

@@ -49,6 +49,9 @@ class ExpertConfig:
     learning_rate: float = 3e-4
     agent_steps_per_update: int = 1
     """Agent steps for each update of actor and critics; 1 learns most from each step, 2 or more from each minute."""
+    episode_steps: int | None = None
+    """Agent steps of a training episode; the task's evaluation length by default. Shorter ones show more starts, which
+    is what rare rewards need; what would come later is estimated by the critics."""
     evaluation_every: int = 10_000
     """Agent steps between two evaluations; each also writes a checkpoint."""
     evaluation_episodes: int = 10
@@ -63,6 +66,8 @@ class ExpertConfig:
             "threads",
         )
         require_at_least(1, **{f"experts {name}": getattr(self, name) for name in counts})
+        if self.episode_steps is not None:
+            require_at_least(1, **{"experts episode_steps": self.episode_steps})
 
 
 def train_expert(config: ExpertConfig, out: Path) -> StatePolicy:
@@ -78,7 +83,9 @@ def train_expert(config: ExpertConfig, out: Path) -> StatePolicy:
     torch.set_num_threads(config.threads)
     _check_same(config, out)
     steps = task_named(config.task).evaluation_steps
-    environment, judged = (StateEnvironment(config.task, steps) for _ in range(2))
+    environment, judged = (
+        StateEnvironment(config.task, length) for length in (config.episode_steps or steps, steps)
+    )
     model = _make_model(config, environment)
     rows = _read_rows(out / "curve.csv")
     if (out / "checkpoint").is_dir():
