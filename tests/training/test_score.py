@@ -7,8 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_runs import TINY, new_run
+from tiny_runs import PICTURES, TINY, new_run
 
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.import_videos import Conversion, import_videos
+from bootifol.demos.record import record
+from bootifol.demos.video_writing import write_video
+from bootifol.errors import BootifolError
 from bootifol.training.api import score_videos
 
 SHORT = replace(TINY, interactive=replace(TINY.interactive, agent_steps=30))
@@ -24,3 +29,28 @@ def test_videos_are_scored_as_far_as_the_method_can_compare(tmp_path: Path, demo
     expert_steps = len(np.load(next((demos / "expert").glob("*.npy")), mmap_mode="r")[0]) - 1
     assert len(rewards) == (89 if method == "gaifo" else expert_steps)
     assert np.isfinite(rewards).all()
+
+
+def test_a_file_is_scored_as_the_video_that_an_import_makes_of_it(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A phone's clip is wide and has more pictures a second than the agent sees."""
+    expert = DemoSet.open(demos / "expert")
+    for index in range(4):
+        wide = np.pad(expert[index].frames, ((0, 0), (0, 0), (16, 16), (0, 0)))
+        write_video(tmp_path / "clips" / f"{index}.mp4", wide.repeat(3, axis=0), 30.0)
+    clips = sorted((tmp_path / "clips").iterdir())
+    conversion = Conversion(expert.manifest.frames, PICTURES.video_size, frames_per_second=10.0)
+    import_videos(clips, tmp_path / "mine" / "expert", conversion)
+    record("drawn_reach", "random", 4, tmp_path / "mine" / "random", PICTURES)
+    monkeypatch.chdir(tmp_path)
+    assert new_run(Path("run"), Path("mine"), config=SHORT).learn()
+    of_set = list(score_videos("run", ["mine/expert"]).values())
+    of_files = list(score_videos("run", clips).values())
+    assert len(of_set) == len(of_files) == 4
+    np.testing.assert_array_equal(of_files, of_set)
+    assert len({rewards.tobytes() for rewards in of_set}) == 4
+
+    monkeypatch.chdir(tmp_path / "clips")
+    with pytest.raises(BootifolError, match="are not at mine: give the command in the directory in which"):
+        score_videos("../run", clips)

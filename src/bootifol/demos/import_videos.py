@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,6 +96,30 @@ def import_videos(
         _write_set(aside, sources, conversion, behavior, name)
         write_contact_sheet(aside, DemoSet.open(aside))
     return DemoSet.open(out)
+
+
+def read_recordings(
+    path: Path, size: int, frames_per_second: float | None, camera: str | None = None
+) -> Iterator[tuple[str, Frames]]:
+    """Videos as an import would show them, but each in one piece and nothing written.
+
+    Args:
+        path: as of `import_videos`.
+        size: height and width of the result.
+        frames_per_second: to resample to, where a file says how fast it plays; None keeps every picture.
+        camera: of a LeRobot dataset.
+
+    Yields:
+        A name, and uint8 `[n, size, size, 3]`.
+
+    Raises:
+        BootifolError: as `import_videos`.
+    """
+    for source in _sources([path], camera if is_lerobot_dataset(path) else None):
+        rate = frames_per_second if _rate(source) else None
+        name = f"{path} episode {source.index}" if isinstance(source, LeRobotEpisode) else str(path)
+        for frames in convert(source, Conversion(sys.maxsize, size, rate)):
+            yield name, frames
 
 
 def convert(source: Source, conversion: Conversion) -> Iterator[Frames]:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 
-from bootifol.demos.demo_set import DemoSet
-from bootifol.demos.manifest import MANIFEST_NAME
-from bootifol.demos.video_files import read_video
-from bootifol.envs.pictures import resize
+from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.import_videos import read_recordings
+from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import draw_references
 from bootifol.evaluation.returns import EpisodeResult, scaled_return
@@ -97,7 +95,7 @@ def continue_run(directory: Path | str) -> bool:
     Returns:
         False if it was asked to stop before its end.
     """
-    run = RunConfig.read(Path(directory))
+    run = _run_with_demos(directory)
     return _learn_and_report(Run(run, Path(directory), Console(stderr=True)))
 
 
@@ -141,12 +139,13 @@ def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[st
 
     Args:
         directory: of the run.
-        videos: video files, folders of frames, .npy files or demo sets.
+        videos: video files, folders of frames, .npy files, LeRobot datasets or demo sets. Files are cut to a square and
+            resampled to the expert videos' pictures per second, as an import does.
 
     Returns:
         Rewards `[T]` by the video's name. A video longer than those it is compared with is scored as far as they reach.
     """
-    run = RunConfig.read(Path(directory))
+    run = _run_with_demos(directory)
     model = build_reward_model(run)
     if model.reads_environment_reward:
         raise BootifolError(
@@ -156,10 +155,9 @@ def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[st
     expert = open_demos(run, Console(stderr=True)).expert
     references = draw_references(model, expert, reference_rng(run.seed, 0))
     length = min((len(reference.frames) for reference in references), default=None)
-    size = run.training.pictures.video_size
     scores: dict[str, Rewards] = {}
     for path in map(Path, videos):
-        for video in _read_videos(path, size):
+        for video in _read_videos(path, run):
             shortened = Video(video.name, video.frames[:length])
             scores[video.name] = model.label(shortened, references)
     return scores
@@ -174,6 +172,17 @@ def write_scores(path: Path, scores: dict[str, Rewards]) -> None:
             writer.writerows([name, step, f"{reward:.6g}"] for step, reward in enumerate(rewards))
 
 
+def _run_with_demos(directory: Path | str) -> RunConfig:
+    """A run's configuration, once its videos are seen to be where it looks for them."""
+    run = RunConfig.read(Path(directory))
+    if not Path(run.demos).is_dir():
+        raise BootifolError(
+            f"the videos that {directory} learns from are not at {run.demos}: give the command in the directory in "
+            "which the run was started, or put them back"
+        )
+    return run
+
+
 def _learn_and_report(run: Run) -> bool:
     if not run.learn():
         return False
@@ -183,12 +192,16 @@ def _learn_and_report(run: Run) -> bool:
     return True
 
 
-def _read_videos(path: Path, size: int) -> list[Video]:
+def _read_videos(path: Path, run: RunConfig) -> Iterator[Video]:
+    """The videos there, with the size and the pace of those that the run learned from."""
     if (path / MANIFEST_NAME).is_file():
         demo_set = DemoSet.open(path)
-        return [demo_set[index] for index in range(len(demo_set))]
-    frames = read_video(path)
-    return [Video(str(path), np.stack([resize(frame, size) for frame in frames]))]
+        yield from map(demo_set.__getitem__, range(len(demo_set)))
+        return
+    expert = read_manifest(find_demo_sets(run.demos)["expert"])
+    size, camera = run.training.pictures.video_size, expert.videos[0].source.get("camera")
+    for name, frames in read_recordings(path, size, expert.frames_per_second, camera):
+        yield Video(name, frames)
 
 
 def _newest(directory: Path) -> Path:
