@@ -63,15 +63,16 @@ def test_a_policy_survives_its_file_exactly(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("short_episodes")
-def test_training_goes_on_where_it_stopped(tmp_path: Path) -> None:
+@pytest.mark.parametrize("n_step", [1, 3])
+def test_training_goes_on_where_it_stopped(tmp_path: Path, n_step: int) -> None:
     torch.manual_seed(0)
-    train_expert(replace(CONFIG, agent_steps=30), tmp_path / "run")
-    train_expert(CONFIG, tmp_path / "run")
+    train_expert(replace(CONFIG, agent_steps=30, n_step=n_step), tmp_path / "run")
+    train_expert(replace(CONFIG, n_step=n_step), tmp_path / "run")
     with (tmp_path / "run" / "curve.csv").open(newline="") as file:
         assert [row["agent_steps"] for row in csv.DictReader(file)] == ["30", "60"]
     assert (tmp_path / "run" / "expert.safetensors").exists()
     with pytest.raises(BootifolError, match=r"another expert \(different: seed\)"):
-        train_expert(replace(CONFIG, seed=2), tmp_path / "run")
+        train_expert(replace(CONFIG, seed=2, n_step=n_step), tmp_path / "run")
 
 
 @pytest.mark.usefixtures("short_episodes")

@@ -15,6 +15,7 @@ def train(
     learning_rate: float = 3e-4,
     discount: float = 0.99,
     agent_steps_per_update: int = 1,
+    n_step: int = 1,
     episode_steps: int | None = None,
     threads: int = 1,
 ) -> int:
@@ -32,6 +33,7 @@ def train(
         learning_rate: Of Adam.
         discount: Of future rewards, an agent step.
         agent_steps_per_update: 1 learns most from each agent step, 2 or more from each minute.
+        n_step: Agent steps whose rewards are summed before a critic estimates what follows.
         episode_steps: Agent steps of a training episode, by default as many as are evaluated; shorter ones show more
             starts, which is what rare rewards need.
         threads: Threads PyTorch computes with.
@@ -47,6 +49,7 @@ def train(
         learning_rate=learning_rate,
         discount=discount,
         agent_steps_per_update=agent_steps_per_update,
+        n_step=n_step,
         episode_steps=episode_steps,
         threads=threads,
     )

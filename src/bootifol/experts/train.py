@@ -49,6 +49,8 @@ class ExpertConfig:
     learning_rate: float = 3e-4
     agent_steps_per_update: int = 1
     """Agent steps for each update of actor and critics; 1 learns most from each step, 2 or more from each minute."""
+    n_step: int = 1
+    """Agent steps whose rewards are summed before critics estimate the rest; rare rewards spread faster with 3."""
     episode_steps: int | None = None
     """Agent steps of a training episode; the task's evaluation length by default. Shorter ones show more starts, which
     is what rare rewards need; what would come later is estimated by the critics."""
@@ -61,6 +63,7 @@ class ExpertConfig:
         counts = (
             "agent_steps",
             "agent_steps_per_update",
+            "n_step",
             "evaluation_every",
             "evaluation_episodes",
             "threads",
@@ -197,6 +200,7 @@ def _make_model(config: ExpertConfig, environment: StateEnvironment) -> Any:
         train_freq=config.agent_steps_per_update,
         learning_rate=config.learning_rate,
         gamma=config.discount,
+        n_steps=config.n_step,
         buffer_size=config.agent_steps,
         learning_starts=min(5000, config.agent_steps // 10),
         seed=config.seed,
