@@ -208,6 +208,19 @@ def test_on_the_cpu_nothing_is_copied() -> None:
     assert to_host(tensor).ctypes.data == tensor.data_ptr()
 
 
+def test_a_gpu_copies_from_pinned_memory_while_the_host_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    copies: list[tuple[bool, object, object]] = []
+    pinned = torch.ones(2)
+    monkeypatch.setattr(torch.Tensor, "pin_memory", lambda tensor: pinned)
+    monkeypatch.setattr(
+        torch.Tensor,
+        "to",
+        lambda tensor, device, non_blocking=False: copies.append((tensor is pinned, device, non_blocking)),
+    )
+    to_device(torch.zeros(2), torch.device("cuda"))
+    assert copies == [(True, torch.device("cuda"), True)]
+
+
 @pytest.mark.parametrize(("there", "meant"), [(False, "cpu"), (True, "cuda")])
 def test_auto_takes_a_gpu_where_there_is_one(
     monkeypatch: pytest.MonkeyPatch, there: bool, meant: str
@@ -220,7 +233,7 @@ def test_auto_takes_a_gpu_where_there_is_one(
 def test_a_gpu_is_chosen_by_its_number(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("torch.cuda.device_count", lambda: 2)
     assert [chosen_device(name) for name in ("cuda", "cuda:0", "cuda:1")] == ["cuda", "cuda:0", "cuda:1"]
-    with pytest.raises(BootifolError, match=r"cannot compute on cuda:2 here \(it sees 2 CUDA devices\)"):
+    with pytest.raises(BootifolError, match="cannot compute on cuda:2 here: choose --device auto"):
         chosen_device("cuda:2")
 
 
@@ -247,5 +260,5 @@ def test_train_says_in_a_sentence_that_a_device_is_missing(
         str(out),
     ]
     assert main([*words, "--device", "cuda"]) == 2
-    assert "PyTorch cannot compute on cuda here (it sees 0 CUDA devices): choose" in capsys.readouterr().err
+    assert "PyTorch cannot compute on cuda here: choose" in capsys.readouterr().err
     assert not out.exists()

@@ -42,12 +42,15 @@ def chosen_device(name: str) -> str:
     if name == "auto":
         return "cuda" if torch.cuda.is_available() else "cpu"
     kind, _, number = name.partition(":")
-    gpus = torch.cuda.device_count()
-    there = {"cpu": True, "mps": torch.backends.mps.is_available(), "cuda": int(number or 0) < gpus}
+    there = {
+        "cpu": True,
+        "cuda": int(number or 0) < torch.cuda.device_count(),
+        "mps": torch.backends.mps.is_available(),
+    }
     if not there[kind]:
         raise BootifolError(
-            f"PyTorch cannot compute on {name} here (it sees {gpus} CUDA devices): choose --device auto or cpu, or "
-            'write "device": "auto" in the config.json of a run made on another machine'
+            f"PyTorch cannot compute on {name} here: choose --device auto or cpu, or write "
+            '"device": "auto" in the config.json of a run made on another machine'
         )
     return name
 
