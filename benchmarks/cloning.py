@@ -127,7 +127,7 @@ def cloned(
                 done, 0, arguments.updates
             )
             batch = draw(config.agent.batch_size, rng)
-            losses.append(agent.clone(batch, learning_rate)["agent/cloning_loss"])
+            losses.append(float(agent.clone(batch, learning_rate)["agent/cloning_loss"]))
             advance(1, loss=losses[-1])
     environment = make_environment(arguments.task, config.pictures, steps)
     results = evaluate(

@@ -8,27 +8,40 @@ from collections import defaultdict
 from pathlib import Path
 from types import TracebackType
 
+from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 
-from bootifol.types import Metrics
+from bootifol.devices import to_floats
+from bootifol.errors import BootifolError
+from bootifol.types import Metrics, StepMetrics
 
 
 class Averages:
     """Means of metrics since the last `pop`, so that a log line stands for all the steps it covers."""
 
     def __init__(self) -> None:
-        self._sums: dict[str, float] = defaultdict(float)
-        self._counts: dict[str, int] = defaultdict(int)
+        self._values: dict[str, list[float | Tensor]] = defaultdict(list)
 
-    def add(self, metrics: Metrics) -> None:
+    def add(self, metrics: StepMetrics) -> None:
+        """Takes metrics in; what is on a device stays there, for fetching it would make the host wait."""
         for name, value in metrics.items():
-            self._sums[name] += value
-            self._counts[name] += 1
+            self._values[name].append(value)
 
     def pop(self) -> dict[str, float]:
-        means = {name: total / self._counts[name] for name, total in self._sums.items()}
-        self._sums.clear()
-        self._counts.clear()
+        """The means, fetched where they are.
+
+        Raises:
+            BootifolError: a loss is NaN or infinite, which learners on a GPU leave to be found here; they skipped the
+                steps.
+        """
+        means = {name: sum(to_floats(values)) / len(values) for name, values in self._values.items()}
+        self._values.clear()
+        for name, mean in means.items():
+            if name.endswith("loss") and not math.isfinite(mean):
+                raise BootifolError(
+                    f"{name} was not a finite number at some of the last steps, which were not taken; the rewards may "
+                    "have grown without bound: resume from the last checkpoint with a lower learning rate"
+                )
         return means
 
 

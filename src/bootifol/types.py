@@ -45,6 +45,9 @@ Rewards = NDArray[np.float32]
 Metrics = Mapping[str, float]
 """Named numbers to log, such as `{"loss/sequence": 0.41}`."""
 
+StepMetrics = Mapping[str, float | torch.Tensor]
+"""Metrics of one step, of which some may still be scalars on their device, to be fetched when they are logged."""
+
 Arrays = dict[str, NDArray[np.generic]]
 """The state of a component as named arrays, ready for a safetensors file."""
 

@@ -26,9 +26,31 @@ def test_doctor_shows_versions_machine_and_render_profiles(capsys: pytest.Captur
     printed = capsys.readouterr().out
     for package in ("torch", "mujoco", "dm-control", "gymnasium", "numpy"):
         assert any(package in line and metadata.version(package) in line for line in printed.splitlines())
-    for word in ("cores", "memory", "bf16 against fp32", "fast", "balanced", "full", "ms an agent step"):
+    for word in (
+        "cores",
+        "memory",
+        "device auto means",
+        "bf16 against fp32",
+        "fast",
+        "balanced",
+        "full",
+        "ms an agent step",
+    ):
         assert word in printed
     assert "missing" not in printed
+
+
+@pytest.mark.parametrize(
+    ("there", "said"),
+    [(False, "cpu"), (True, "cuda, Some GPU; not tried yet: --device cpu computes as ever")],
+)
+def test_doctor_says_where_training_would_compute(
+    monkeypatch: pytest.MonkeyPatch, there: bool, said: str
+) -> None:
+    monkeypatch.setattr("torch.cuda.is_available", lambda: there)
+    monkeypatch.setattr("torch.cuda.get_device_name", lambda: "Some GPU")
+    monkeypatch.setattr(doctor_command, "bf16_speed", lambda: 1.0)
+    assert dict(doctor_command.machine())["device auto means"] == said
 
 
 @pytest.mark.usefixtures("requires_rendering")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_runs import RUNS, WITH_DEMONSTRATIONS, new_run, resumed
+from tiny_runs import RUNS, TINY, WITH_DEMONSTRATIONS, new_run, resumed
 
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.errors import BootifolError
@@ -108,6 +109,24 @@ def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
 
     assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
     np.testing.assert_array_equal(next_actions(whole), next_actions(rest))
+
+
+def test_a_run_goes_on_with_another_name_of_the_device(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("torch.cuda.is_available", lambda: False)
+    whole = new_run(tmp_path / "whole", demos)
+    assert whole.learn()
+
+    with monkeypatch.context() as patch:
+        signal_at(patch, signal.SIGTERM, episode=2)
+        assert not new_run(tmp_path / "parts", demos, config=replace(TINY, device="auto")).learn()
+    path = tmp_path / "parts" / "config.json"
+    path.write_text(path.read_text().replace('"device": "auto"', '"device": "cpu"'))
+    rest = resumed(tmp_path / "parts")
+    assert rest.run.training.device == "cpu"
+    assert rest.learn()
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
 
 
 def test_ctrl_c_during_alignment_can_be_resumed(

@@ -28,6 +28,15 @@ def test_an_unknown_field_is_named(tmp_path: Path) -> None:
         RunConfig.read(tmp_path)
 
 
+def test_a_run_of_before_devices_takes_the_one_at_hand(tmp_path: Path) -> None:
+    RunConfig("drawn_reach", "bootifol", "cpu", 3, "demos", None, CPU).write(tmp_path, [])
+    path = tmp_path / "config.json"
+    data = json.loads(path.read_text())
+    del data["config"]["device"]
+    path.write_text(json.dumps(data))
+    assert RunConfig.read(tmp_path).training.device == "auto"
+
+
 def test_a_directory_without_a_run_is_named(tmp_path: Path) -> None:
     with pytest.raises(BootifolError, match="is not a run"):
         RunConfig.read(tmp_path)

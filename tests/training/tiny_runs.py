@@ -22,6 +22,7 @@ PICTURES = PictureConfig(agent_size=32, video_size=32)
 TINY = replace(
     SMOKE,
     pictures=PICTURES,
+    device="cpu",  # what must hold bit for bit does so there
     threads=1,
     tensorboard=False,
     reward=RewardConfig(

@@ -18,9 +18,11 @@ from torch import Tensor, nn
 
 from bootifol.agents.config import DrQv2Config
 from bootifol.agents.encodings import FrameEncodings
+from bootifol.agents.gradient_step import take_step
 from bootifol.agents.networks import Actor, Critic, Encoder, EncodingEncoder, initialize
+from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
-from bootifol.types import Action, Arrays, Batch, Metrics, Observation
+from bootifol.types import Action, Arrays, Batch, Observation, StepMetrics
 
 SATURATED = 0.98
 """Mean actions beyond this are counted as saturated in the metrics."""
@@ -58,12 +60,12 @@ def noisy_action(mean: Tensor, stddev: float, clip: float | None, generator: tor
         mean: `[B, A]` in [-1, 1].
         stddev: of the noise.
         clip: largest noise, or None for no limit.
-        generator: where the noise comes from.
+        generator: where the noise comes from; the CPU's, so that every device gets the same.
 
     Returns:
         `[B, A]`. The cut to [-1, 1] is ignored by the gradient: it is that of `mean`, even at the border.
     """
-    noise = torch.randn(mean.shape, generator=generator, device=mean.device) * stddev
+    noise = to_device(torch.randn(mean.shape, generator=generator), mean.device) * stddev
     if clip is not None:
         noise = noise.clamp_(-clip, clip)
     with torch.no_grad():
@@ -80,7 +82,7 @@ class DrQv2:
         stack: frames stacked in an observation.
         action_dim: action dimensions.
         seed: of the initial parameters and of the noise.
-        device: where the networks live.
+        device: where to compute, as PyTorch names it.
         encodings: what turns pictures into encodings where the configuration says so; None otherwise.
 
     Raises:
@@ -117,7 +119,7 @@ class DrQv2:
         self._averaged: tuple[Encoder | EncodingEncoder, Actor] | None = None
         if config.averaging > 0:
             self._averaged = copy.deepcopy(self.encoder), copy.deepcopy(self.actor)
-        self._generator = torch.Generator(self._device).manual_seed(int(start.initial_seed()) + 1)
+        self._generator = torch.Generator().manual_seed(int(start.initial_seed()) + 1)
         self._critic_optimizer = torch.optim.Adam(
             [*self.encoder.parameters(), *self.critic.parameters()], config.learning_rate, fused=True
         )
@@ -160,9 +162,10 @@ class DrQv2:
             mean = actor(encoder(self._network_input(picture, torch.float32)))
             if explore:
                 mean = noisy_action(mean, self.config.exploration(agent_steps), None, self._generator)
-            return _to_numpy(mean[0])
+            action: Action = to_host(mean[0])  # which the environment waits for
+            return action
 
-    def clone(self, batch: Batch, learning_rate: float) -> Metrics:
+    def clone(self, batch: Batch, learning_rate: float) -> StepMetrics:
         """One gradient step of encoder and actor towards the actions of a batch; its rewards are not looked at.
 
         Args:
@@ -170,28 +173,31 @@ class DrQv2:
             learning_rate: of Adam, for this step.
 
         Raises:
-            BootifolError: the loss is NaN or infinite; the parameters are as before.
+            BootifolError: the loss is NaN or infinite (see `take_step`); the parameters are as before.
         """
         observation = self._network_input(batch.observation, self._precision)
         with self._autocast():
             action = self.actor(self.encoder(observation))
-        loss = cloning_loss(action, batch.action.to(self._device))
+        loss = cloning_loss(action, to_device(batch.action, self._device))
         self._cloning_optimizer.param_groups[0]["lr"] = learning_rate
         self._step(self._cloning_optimizer, loss, "cloning")
         self._average()
-        return {"agent/cloning_loss": float(loss.detach())}
+        return {"agent/cloning_loss": loss.detach()}
 
-    def update(self, batch: Batch, agent_steps: float) -> Metrics:
+    def update(self, batch: Batch, agent_steps: float) -> StepMetrics:
         """One update of critic and encoder, of the actor, and of the target critic, in this order.
 
+        Nothing in it waits for a GPU, and metrics stay there until they are logged.
+
         Raises:
-            BootifolError: a loss is NaN or infinite; the parameters are as before the step that failed.
+            BootifolError: a loss is NaN or infinite (see `take_step`); the parameters are as before the step that
+                failed.
         """
         stddev = self.config.exploration(agent_steps)
         observation = self._network_input(batch.observation, self._precision)
         next_observation = self._network_input(batch.next_observation, self._precision)
         action, reward, discount = (
-            tensor.to(self._device) for tensor in (batch.action, batch.reward, batch.discount)
+            to_device(tensor, self._device) for tensor in (batch.action, batch.reward, batch.discount)
         )
 
         with torch.no_grad(), self._autocast():
@@ -202,7 +208,10 @@ class DrQv2:
             features = self.encoder(observation)
             q1, q2 = self.critic(features, action)
         loss_of_critic = critic_loss(q1, q2, target)
-        rows = batch.demonstrated if self.config.cloning_weight > 0 else None
+        rows = None
+        if self.config.cloning_weight > 0 and batch.demonstrated is not None:
+            # As numbers: how many rows a mask has, a GPU would have to tell the host first.
+            rows = to_device(batch.demonstrated.nonzero().squeeze(1), self._device)
         # Times the mean of |Q|, so that one weight suits rewards of any scale (as TD3+BC: Fujimoto and Gu, 2021).
         # The critic starts near 0, and without a floor its first errors would undo the clone.
         cloning_weight = self.config.cloning_weight * q1.detach().abs().mean().clamp(min=1.0)
@@ -216,7 +225,7 @@ class DrQv2:
         features = features.detach()
         with torch.no_grad(), self._autocast():
             trunk = self.critic.trunk(features)
-        metrics = {}
+        metrics: dict[str, float | Tensor] = {}
         with self._autocast():
             before_tanh = self.actor.before_tanh(features)
             mean_action = torch.tanh(before_tanh)
@@ -226,7 +235,7 @@ class DrQv2:
         if rows is not None:
             loss_of_cloning = cloning_loss(mean_action[rows], action[rows])
             loss_of_actor = loss_of_actor + cloning_weight * loss_of_cloning
-            metrics["agent/cloning_loss"] = float(loss_of_cloning.detach())
+            metrics["agent/cloning_loss"] = loss_of_cloning.detach()
         self._step(self._actor_optimizer, loss_of_actor, "actor")
 
         with torch.no_grad():
@@ -235,13 +244,13 @@ class DrQv2:
             )
         self._average()
         return metrics | {
-            "agent/critic_loss": float(loss_of_critic.detach()),
-            "agent/actor_loss": float(loss_of_actor.detach()),
-            "agent/q": float(q1.detach().mean()),
-            "agent/target": float(target.mean()),
-            "agent/batch_reward": float(reward.mean()),
+            "agent/critic_loss": loss_of_critic.detach(),
+            "agent/actor_loss": loss_of_actor.detach(),
+            "agent/q": q1.detach().mean(),
+            "agent/target": target.mean(),
+            "agent/batch_reward": reward.mean(),
             "agent/exploration": stddev,
-            "agent/saturated": float((mean_action.detach().abs() > SATURATED).float().mean()),
+            "agent/saturated": (mean_action.detach().abs() > SATURATED).float().mean(),
         }
 
     def _average(self) -> None:
@@ -259,7 +268,7 @@ class DrQv2:
         for name, prefix, state in self._optimizer_states():
             for key, value in state.items():
                 arrays[f"{prefix}{key}/{name}"] = _copied(value)
-        arrays["generator"] = self._generator.get_state().numpy().copy()
+        arrays["generator"] = _copied(self._generator.get_state())
         return arrays
 
     def load_state(self, arrays: Arrays) -> None:
@@ -315,7 +324,7 @@ class DrQv2:
         """What the encoder reads of pictures uint8 `[B, 3 * stack, S, S]`: they themselves, or their encodings."""
         if self._encodings is not None:
             observation = self._encodings(observation)
-        return observation.to(self._device, dtype)
+        return to_device(observation, self._device).to(dtype)
 
     @property
     def _precision(self) -> torch.dtype:
@@ -328,16 +337,9 @@ class DrQv2:
         return noisy_action(mean, stddev, self.config.noise_clip, self._generator)
 
     @staticmethod
-    def _step(optimizer: torch.optim.Optimizer, loss: Tensor, what: str) -> None:
-        if not torch.isfinite(loss):
-            raise BootifolError(
-                f"the loss of the agent's {what} is {float(loss.detach())}; the rewards may have grown without bound: "
-                "resume from the last checkpoint with a lower learning rate"
-            )
-        optimizer.zero_grad(set_to_none=True)
-        # Naming the inputs spares the actor's loss the gradients of the critic's weights.
-        torch.autograd.backward(loss, inputs=optimizer.param_groups[0]["params"])
-        optimizer.step()
+    def _step(optimizer: torch.optim.Adam, loss: Tensor, what: str) -> None:
+        advice = "the rewards may have grown without bound: resume from the last checkpoint with a lower learning rate"
+        take_step(optimizer, loss, f"the agent's {what}", advice)
 
 
 def _to_channels_last(network: nn.Module) -> None:
@@ -346,10 +348,5 @@ def _to_channels_last(network: nn.Module) -> None:
             parameter.data = parameter.data.to(memory_format=torch.channels_last)
 
 
-def _to_numpy(action: Tensor) -> Action:
-    array: Action = action.cpu().numpy()
-    return array
-
-
 def _copied(tensor: Tensor) -> NDArray[np.generic]:
-    return tensor.detach().cpu().numpy().copy()
+    return to_host(tensor).copy()

@@ -35,10 +35,13 @@ class FrameEncodings:
         return self._stack * self._model.encoding_dim
 
     def __call__(self, observation: Tensor) -> Tensor:
-        """Encodings float32 `[B, stack * Z]`, oldest first, of stacks of pictures uint8 `[B, 3 * stack, S, S]`."""
+        """Encodings float32 `[B, stack * Z]`, oldest first, of stacks of pictures uint8 `[B, 3 * stack, S, S]`.
+
+        The pictures are the host's, which resizes them; the encodings are the reward model's device's.
+        """
         count, _, height, width = observation.shape
         stacks = observation.reshape(count * self._stack, _CHANNELS, height, width)
-        frames: Frames = stacks.permute(0, 2, 3, 1).cpu().numpy()
+        frames: Frames = stacks.permute(0, 2, 3, 1).numpy()
         if frames.shape[1] != self._model.video_size:
             frames = np.stack([resize(frame, self._model.video_size) for frame in frames])
         return self._model.encode_frames(frames).reshape(count, self.size)

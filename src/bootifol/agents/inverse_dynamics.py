@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from bootifol.agents.config import EncoderName
+from bootifol.agents.gradient_step import take_step
 from bootifol.agents.networks import Encoder
-from bootifol.errors import BootifolError
-from bootifol.types import Arrays, Batch, Frames, Metrics
+from bootifol.devices import to_device, to_host
+from bootifol.types import Arrays, Batch, Frames, StepMetrics
 
 
 class InverseDynamics:
@@ -28,6 +29,7 @@ class InverseDynamics:
         action_dim: action dimensions.
         seed: of the initial parameters.
         hidden_dim: width of the two hidden layers.
+        device: where to compute, as PyTorch names it.
     """
 
     def __init__(
@@ -39,8 +41,10 @@ class InverseDynamics:
         action_dim: int,
         seed: int,
         hidden_dim: int = 512,
+        device: str = "cpu",
     ) -> None:
         self.stack, self.n_step = stack, n_step
+        self._device = torch.device(device)
         # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
@@ -55,9 +59,10 @@ class InverseDynamics:
                 nn.Linear(hidden_dim, action_dim),
             )
         convolutions.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.network.to(self._device)
         self._optimizer = torch.optim.Adam(self.network.parameters(), fused=True)
 
-    def update(self, batch: Batch, learning_rate: float) -> Metrics:
+    def update(self, batch: Batch, learning_rate: float) -> StepMetrics:
         """One gradient step on the agent's own transitions, whose two observations were shifted alike.
 
         Args:
@@ -66,18 +71,16 @@ class InverseDynamics:
 
         Returns:
             The mean squared error of the actions.
+
+        Raises:
+            BootifolError: it is NaN or infinite (see `take_step`); the parameters are as before.
         """
-        loss = nn.functional.mse_loss(self._predict(batch.observation, batch.next_observation), batch.action)
-        if not torch.isfinite(loss):
-            raise BootifolError(
-                f"the loss of the inverse dynamics is {float(loss.detach())}; the step was not taken: resume from the "
-                "last checkpoint"
-            )
+        predicted = self._predict(batch.observation, batch.next_observation)
+        loss = nn.functional.mse_loss(predicted, to_device(batch.action, self._device))
         self._optimizer.param_groups[0]["lr"] = learning_rate
-        self._optimizer.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
-        self._optimizer.step()
-        return {"inverse_dynamics/loss": float(loss.detach())}
+        advice = "the step was not taken: resume from the last checkpoint"
+        take_step(self._optimizer, loss, "the inverse dynamics", advice)
+        return {"inverse_dynamics/loss": loss.detach()}
 
     def actions(self, frames: Frames) -> NDArray[np.float32]:
         """The actions `[T, A]` in [-1, 1] that a video `[T + 1, S, S, 3]` shows."""
@@ -88,16 +91,16 @@ class InverseDynamics:
         after = frames[np.maximum(np.minimum(now + self.n_step, steps) + back, 0)]
         with torch.inference_mode():
             predicted = self._predict(_stacked(before), _stacked(after)).clamp(-1.0, 1.0)
-        actions: NDArray[np.float32] = predicted.numpy()
+        actions: NDArray[np.float32] = to_host(predicted)
         return actions
 
     def state(self) -> Arrays:
         """Parameters and optimizer."""
         arrays: Arrays = {}
         for name, parameter in self.network.named_parameters():
-            arrays[name] = parameter.detach().numpy().copy()
+            arrays[name] = to_host(parameter).copy()
             for key, value in self._optimizer.state[parameter].items():
-                arrays[f"{key}/{name}"] = value.numpy().copy()
+                arrays[f"{key}/{name}"] = to_host(value).copy()
         return arrays
 
     def load_state(self, arrays: Arrays) -> None:
@@ -107,15 +110,16 @@ class InverseDynamics:
                 parameter.copy_(torch.from_numpy(arrays[name]))
             for key in ("step", "exp_avg", "exp_avg_sq"):
                 if f"{key}/{name}" in arrays:
-                    value = torch.from_numpy(arrays[f"{key}/{name}"].copy())
+                    value = torch.from_numpy(arrays[f"{key}/{name}"].copy()).to(self._device)
                     if value.dim() == 4:
                         value = value.to(memory_format=torch.channels_last)
                     self._optimizer.state[parameter][key] = value
 
     def _predict(self, before: Tensor, after: Tensor) -> Tensor:
         """Actions `[B, A]` from two stacks, uint8 `[B, 3 * stack, S, S]` each."""
-        pictures = torch.cat([before, after], dim=1).to(torch.bfloat16, memory_format=torch.channels_last)
-        with torch.autocast("cpu", torch.bfloat16):
+        pictures = torch.cat([to_device(stack, self._device) for stack in (before, after)], dim=1)
+        pictures = pictures.to(torch.bfloat16, memory_format=torch.channels_last)
+        with torch.autocast(self._device.type, torch.bfloat16):
             output: Tensor = self.network(pictures)
         return output.float()
 

@@ -94,12 +94,16 @@ def machine() -> list[tuple[str, str]]:
     """Rows about cores, memory and arithmetic."""
     import torch
 
+    from bootifol.devices import chosen_device
+
     rows = [("cores", f"{_cores()} ({torch.get_num_threads()} used by PyTorch)")]
     memory = _memory_bytes()
     if memory is not None:
         rows.append(("memory", f"{memory / 2**30:.1f} GB"))
-    if torch.cuda.is_available():
-        rows.append(("GPU", torch.cuda.get_device_name()))
+    device = chosen_device("auto")
+    if device != "cpu":
+        device += f", {torch.cuda.get_device_name()}; not tried yet: --device cpu computes as ever"
+    rows.append(("device auto means", device))
     ratio = bf16_speed()
     advice = "worth using" if ratio > 1.2 else "no gain: keep precision at fp32"
     rows.append(("bf16 against fp32", f"matrix products {ratio:.1f} times as fast ({advice})"))

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
 from bootifol.networks import efficientnet_lite
 from bootifol.networks.transformers_models import Normalization, load_transformers_model
@@ -96,10 +97,10 @@ class Backbone:
             torch.autocast(self._device.type, torch.bfloat16, enabled=self._precision == "bf16"),
         ):
             # Channels come last in a frame, as in the layout that convolutions are quickest in.
-            pictures = torch.from_numpy(np.array(frames)).to(self._device).permute(0, 3, 1, 2)
+            pictures = to_device(torch.from_numpy(np.array(frames)), self._device).permute(0, 3, 1, 2)
             normalized = (pictures.float() / 255 - self._mean) / self._deviation
             features = cast(torch.Tensor, self._network(normalized))
-            return cast(Features, features.float().cpu().numpy())
+            return to_host(features.float())
 
     def _checked_feature_size(self) -> int:
         """F, found by trying; refuses what cannot serve as a backbone."""
@@ -148,5 +149,5 @@ def _fingerprint(network: nn.Module, normalization: Normalization) -> str:
     digest = hashlib.sha256(repr(normalization).encode())
     for name, value in network.state_dict().items():
         digest.update(name.encode())
-        digest.update(value.detach().cpu().contiguous().view(-1).view(torch.uint8).numpy().data)
+        digest.update(to_host(value.contiguous().view(-1).view(torch.uint8)).data)
     return digest.hexdigest()

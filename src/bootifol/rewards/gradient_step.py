@@ -6,8 +6,9 @@ import numpy as np
 import torch
 from torch import nn
 
+from bootifol.devices import to_floats
 from bootifol.errors import BootifolError
-from bootifol.types import Metrics
+from bootifol.types import Metrics, StepMetrics
 
 
 class GradientStep:
@@ -26,29 +27,30 @@ class GradientStep:
         self._statistics = [buffer.clone() for buffer in module.buffers()]
         optimizer.zero_grad(set_to_none=True)
 
-    def take(self, loss: torch.Tensor, metrics: Metrics) -> Metrics:
+    def take(self, loss: torch.Tensor, metrics: StepMetrics) -> Metrics:
         """Follows the gradient of `loss`.
 
         Returns:
-            The metrics and, as `loss/total`, the loss.
+            The metrics, as numbers, and, as `loss/total`, the loss.
 
         Raises:
             BootifolError: the loss or its gradient is not finite; nothing has changed then. Names the metrics.
         """
-        total = float(loss.detach())
-        metrics = {**metrics, "loss/total": total}
+        loss.backward()  # type: ignore[no-untyped-call]
+        gradients = [p.grad for p in self._module.parameters() if p.grad is not None]
+        norm = torch.nn.utils.get_total_norm(gradients)
+        # The host waits for a GPU here, once a step: what it fetches decides whether the step is taken.
+        *numbers, total, length = to_floats([*metrics.values(), loss, norm])
+        fetched = {**dict(zip(metrics, numbers, strict=True)), "loss/total": total}
         try:
-            self._refuse_if_not_finite(total, metrics)
-            loss.backward()  # type: ignore[no-untyped-call]
-            gradients = [p.grad for p in self._module.parameters() if p.grad is not None]
-            norm = float(torch.nn.utils.get_total_norm(gradients))
-            self._refuse_if_not_finite(norm, {**metrics, "gradient norm": norm})
+            self._refuse_if_not_finite(total, fetched)
+            self._refuse_if_not_finite(length, {**fetched, "gradient norm": length})
         except BootifolError:
             for buffer, good in zip(self._module.buffers(), self._statistics, strict=True):
                 buffer.copy_(good)
             raise
         self._optimizer.step()
-        return metrics
+        return fetched
 
     def _refuse_if_not_finite(self, value: float, metrics: Metrics) -> None:
         if not np.isfinite(value):

@@ -8,8 +8,10 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import nn
 
+from bootifol.devices import to_device
 from bootifol.rewards.gradient_step import GradientStep
 from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
 from bootifol.rewards.video_checks import checked_videos
@@ -93,6 +95,10 @@ class LearnedRewardModel(Generic[Config, Networks]):
         """One video, uint8 `[T + 1, H, W, 3]` of the model's size."""
         video: Frames = checked_videos(frames[None], self.video_size)[0]
         return video
+
+    def _on_device(self, array: NDArray[np.generic]) -> torch.Tensor:
+        """An array of the host as a tensor where the networks compute."""
+        return to_device(torch.from_numpy(array), self.device)
 
     def _begin_step(self) -> GradientStep:
         """The gradient step after those that `version` counts; to be made before the forward pass."""

@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from bootifol.devices import to_host
 from bootifol.errors import BootifolError
 from bootifol.types import Arrays
 
@@ -61,8 +62,7 @@ def load_generator(rng: np.random.Generator, array: NDArray[np.generic]) -> None
 
 
 def _array(value: torch.Tensor) -> NDArray[np.generic]:
-    copy: NDArray[np.generic] = value.detach().cpu().clone(memory_format=torch.contiguous_format).numpy()
-    return copy
+    return to_host(value.detach().clone(memory_format=torch.contiguous_format))
 
 
 def _like(array: NDArray[np.generic], parameter: torch.Tensor) -> torch.Tensor:

@@ -17,7 +17,7 @@ from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
 from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.demonstrations import Demonstrations
-from bootifol.types import Metrics
+from bootifol.types import StepMetrics
 
 
 class CloningSteps(NamedTuple):
@@ -36,7 +36,7 @@ def cloning_phase(
     rng: np.random.Generator,
     budget: Budget,
     counters: Counters,
-) -> Iterator[Metrics]:
+) -> Iterator[StepMetrics]:
     """Learns the inverse dynamics, infers the videos' actions and rewards, and clones them.
 
     Args:
@@ -59,7 +59,7 @@ def cloning_phase(
     first = _steps_until(demonstrations, counters.cloning_phases - 1)
     end = _steps_until(demonstrations, counters.cloning_phases)
     while not budget.ended(counters) and (done := _steps_done(counters)) != end:
-        metrics: Metrics = {}
+        metrics: StepMetrics = {}
         if done.inverse_dynamics_updates < end.inverse_dynamics_updates:
             rate = one_cycle(
                 done.inverse_dynamics_updates, first.inverse_dynamics_updates, end.inverse_dynamics_updates

@@ -20,6 +20,7 @@ from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.demos.features import FeaturizedVideos, without_pixels
 from bootifol.demos.manifest import read_manifest
 from bootifol.demos.record import record
+from bootifol.devices import chosen_device
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import KINDS
 from bootifol.networks.backbones import Backbone
@@ -79,12 +80,15 @@ def build_environment(run: RunConfig, episode_steps: int) -> gymnasium.Env[Any, 
 
 def build_reward_model(run: RunConfig) -> RewardModel:
     """The method's reward model, untrained."""
-    return make_reward_model(run.method, run.training.reward, run.training.pictures.video_size, run.seed)
+    config = run.training
+    device = chosen_device(config.device)
+    return make_reward_model(run.method, config.reward, config.pictures.video_size, run.seed, device)
 
 
 def build_backbone(run: RunConfig) -> Backbone | None:
     """The frozen network whose features the reward model reads; None where it reads pixels."""
-    return make_backbone(run.method, run.training.reward, run.training.pictures.video_size)
+    config = run.training
+    return make_backbone(run.method, config.reward, config.pictures.video_size, chosen_device(config.device))
 
 
 def build_agent(
@@ -104,7 +108,8 @@ def build_agent(
         pictures.stack,
         environment.action_space.shape[0],
         run.seed,
-        encodings=encodings,
+        chosen_device(run.training.device),
+        encodings,
     )
 
 
@@ -158,7 +163,13 @@ def build_demonstrations(run: RunConfig, expert: VideoSource, action_dim: int) -
         _shift(run),
     )
     inverse_dynamics = InverseDynamics(
-        agent.encoder, pictures.agent_size, pictures.stack, agent.n_step, action_dim, run.seed
+        agent.encoder,
+        pictures.agent_size,
+        pictures.stack,
+        agent.n_step,
+        action_dim,
+        run.seed,
+        device=chosen_device(run.training.device),
     )
     return Demonstrations(config, expert, replay, inverse_dynamics, pictures.agent_size, action_dim)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from bootifol.agents.config import DrQv2Config
 from bootifol.demos.augmentation import AugmentationConfig
+from bootifol.devices import check_device_name
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import require_at_least
 from bootifol.rewards.registry import RewardConfig
@@ -121,6 +122,10 @@ class TrainingConfig:
     evaluation_steps: int | None = None
     """Agent steps of an evaluation episode, instead of the task's own."""
 
+    device: str = "auto"
+    """Where networks compute: auto (a CUDA GPU where PyTorch sees one, else the CPU), cpu, cuda, cuda:NUMBER, or mps on
+    a Mac. None but the CPU has been tried."""
+
     threads: int = 2
     """Threads PyTorch computes with."""
 
@@ -131,4 +136,5 @@ class TrainingConfig:
     """Also write TensorBoard event files."""
 
     def __post_init__(self) -> None:
+        check_device_name(self.device)
         require_at_least(1, threads=self.threads)

@@ -24,7 +24,7 @@ from bootifol.errors import BootifolError, require_at_least
 from bootifol.evaluation.ranking import draw_references
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
-from bootifol.types import Arrays, Batch, Episode, Frames, Metrics, Video, VideoSource
+from bootifol.types import Arrays, Batch, Episode, Frames, StepMetrics, Video, VideoSource
 
 MOVING = 0.1
 """A picture moves where it changes by more than this share of its video's largest change."""
@@ -127,7 +127,7 @@ class Demonstrations:
 
     def learn_inverse_dynamics(
         self, agent_replay: ReplayBuffer, policy_steps: int, rng: np.random.Generator, learning_rate: float
-    ) -> Metrics:
+    ) -> StepMetrics:
         """One gradient step of the inverse dynamics on the agent's own steps.
 
         Args:

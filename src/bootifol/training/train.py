@@ -13,6 +13,7 @@ import torch
 from rich.console import Console
 
 from bootifol.demos.augmentation import augmented
+from bootifol.devices import chosen_device
 from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import (
@@ -69,6 +70,9 @@ class Run:
         keep_freed_memory()
         self.task = self.run.resolved_task()
         check_method(self.run.method)
+        device = chosen_device(config.device)
+        if device != "cpu":
+            self.console.print(f"computing on {device}, which has not been tried yet; --device cpu has")
         self.demos = open_demos(self.run, self.console)
         self.environment = build_environment(self.run, self.task.episode_steps)
         self.components = build_components(self.run, self.environment, self.demos.expert, self.console)
@@ -164,6 +168,7 @@ class Run:
         assert demonstrations is not None
         averages = Averages()
         log_every = self.run.training.interactive.log_every
+        shown: dict[str, float] = {}
         done, total = cloning_extent(demonstrations, self.counters)
         phase = cloning_phase(
             self.components.agent,
@@ -178,10 +183,11 @@ class Run:
             for metrics in phase:
                 averages.add(metrics)
                 done += 1
-                advance(1, **metrics)
                 if (done % log_every == 0 or done == total) and (means := averages.pop()):
                     gradient_steps = self.counters.inverse_dynamics_updates + self.counters.cloning_updates
                     self._log("cloning", "gradient_step", gradient_steps, means)
+                    shown |= means
+                advance(1, **shown)
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()

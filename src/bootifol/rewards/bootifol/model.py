@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
 from bootifol.networks.backbones import load_backbone
 from bootifol.networks.color import lab_views
@@ -98,12 +99,11 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         reward = self._aggregate(rewards)
         if self.config.reward_scale == "alignment" and self._scale.known:
             reward = self._scale.rewards(reward)
-        return reward.numpy()
+        return to_host(reward)
 
     def embed(self, frames: Frames) -> NDArray[np.float32]:
         """Encodings z of every prefix of a video: `[T + 1, H, W, 3]` to `[T + 1, 128]`."""
-        encoding: NDArray[np.float32] = self._encode([Video("", frames)])[0].numpy()
-        return encoding
+        return to_host(self._encode([Video("", frames)])[0])
 
     def encode_frames(self, frames: Frames) -> torch.Tensor:
         """s = g(o) of single frames: uint8 `[N, H, W, 3]` to float32 `[N, 128]`, without gradients."""
@@ -146,19 +146,22 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         step = self._begin_step()
         total, terms, distances = self._losses(videos[:, drawn.kept], drawn)
         metrics = step.take(total, terms)
+        # In float64, of which the scale is made; the host has waited for the step just now.
+        measured = to_host(distances).astype(np.float64)
         self.version += 1
         self._encodings.clear()
         if scaling:
-            self._scale.observe(drawn.kept, distances[: n - spoiled_count].mean(0))
-        return metrics
+            self._scale.observe(drawn.kept, measured[: n - spoiled_count].mean(0))
+        return {**metrics, "distance/expert_other": float(measured.mean())}
 
     def _losses(
         self, videos: FrameBatch | FeatureBatch, drawn: Draw
-    ) -> tuple[torch.Tensor, dict[str, float], NDArray[np.float64]]:
+    ) -> tuple[torch.Tensor, dict[str, torch.Tensor], torch.Tensor]:
         """L and its terms on n expert videos followed by n others, `[2n, T' + 1, H, W, 3]` or `[2n, T' + 1, F]`.
 
         Returns:
-            L; the metrics; the distance of each expert's and other's encodings at every kept frame, `[n, T' + 1]`.
+            L; the metrics of its terms; the distance of each expert's and other's encodings at every kept frame,
+            `[n, T' + 1]`.
         """
         config = self.config
         count, length = videos.shape[:2]
@@ -207,10 +210,8 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         weights = {name: getattr(config, f"{name}_weight") for name in terms}
         total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
         with torch.no_grad():
-            distances = torch.linalg.vector_norm(expert - other, dim=2).double().cpu().numpy()
-        metrics = {f"loss/{name}": float(term.detach()) for name, term in terms.items()}
-        metrics["distance/expert_other"] = float(distances.mean())
-        return total, metrics, distances
+            distances = torch.linalg.vector_norm(expert - other, dim=2)
+        return total, {f"loss/{name}": term for name, term in terms.items()}, distances
 
     def _encode(self, videos: Sequence[Video]) -> list[torch.Tensor]:
         """Encodings `[T + 1, 128]` of each video, in evaluation mode: a frame's state depends on that frame alone.
@@ -222,7 +223,7 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         for video in videos:
             states = self._frame_states(self._checked_inputs(video))
             with self._evaluating():
-                encodings.append(self.networks.sequence_encoder(states[None])[0][0].cpu())
+                encodings.append(self.networks.sequence_encoder(states[None])[0][0])
         return encodings
 
     def _frame_states(self, frames: Frames | Features) -> torch.Tensor:
@@ -255,10 +256,10 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
     def _inputs(self, frames: Frames | Features) -> tuple[torch.Tensor, ...]:
         """Pixels `[N, H, W, 3]` to the views L `[N, 1, H, W]` and ab `[N, 2, H, W]`; features `[N, F]` as they are."""
         if self.backbone:
-            return (torch.from_numpy(frames).to(self.device),)
+            return (self._on_device(frames),)
         dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32
         lightness, color = lab_views(cast(Frames, frames), dtype)
-        return lightness.to(self.device), color.to(self.device)
+        return to_device(lightness, self.device), to_device(color, self.device)
 
     def _aggregate(self, rewards: torch.Tensor) -> torch.Tensor:
         """Rewards by reference `[R, T]` to `[T]`."""
@@ -270,4 +271,4 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         return (weights * rewards).sum(0)
 
     def _indices(self, indices: NDArray[np.int64]) -> torch.Tensor:
-        return torch.from_numpy(indices.reshape(-1)).to(self.device)
+        return self._on_device(indices.reshape(-1))

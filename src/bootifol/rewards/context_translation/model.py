@@ -8,12 +8,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from bootifol.devices import to_host
 from bootifol.rewards.context_translation import losses
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.context_translation.networks import ContextTranslationNetworks
 from bootifol.rewards.learned import LearnedRewardModel
 from bootifol.rewards.video_checks import check_references
-from bootifol.types import Arrays, FrameBatch, Metrics, Rewards, Video, VideoSource
+from bootifol.types import Arrays, FrameBatch, Metrics, Rewards, StepMetrics, Video, VideoSource
 
 MEMORY = 0.9
 """The cost of expert frames is averaged exponentially over about the last 10 gradient steps, for it falls quickly."""
@@ -75,8 +76,7 @@ class ContextTranslationRewardModel(LearnedRewardModel[ContextTranslationConfig,
             )
             if config.reward_unit == "expert" and self._expert_cost > 0:
                 cost = cost / self._expert_cost
-        rewards: Rewards = -cost.cpu().numpy()
-        return rewards
+        return to_host(-cost)
 
     def state(self) -> Arrays:
         """What every reward model has, and the cost of expert frames."""
@@ -101,7 +101,7 @@ class ContextTranslationRewardModel(LearnedRewardModel[ContextTranslationConfig,
 
     def _losses(
         self, source: FrameBatch, target: FrameBatch, moments: NDArray[np.int64]
-    ) -> tuple[torch.Tensor, dict[str, float]]:
+    ) -> tuple[torch.Tensor, StepMetrics]:
         """L and its terms, from frames of `source` translated into the context of `target`.
 
         Args:
@@ -132,10 +132,9 @@ class ContextTranslationRewardModel(LearnedRewardModel[ContextTranslationConfig,
                 total = total + config.reconstruction_weight * terms["reconstruction"]
         with torch.no_grad():
             cost = losses.imitation_cost(features, translated, wanted, pictures, config.image_weight).mean()
-        metrics = {f"loss/{name}": float(term.detach()) for name, term in terms.items()}
-        return total, {**metrics, "cost/expert": float(cost)}
+        return total, {**{f"loss/{name}": term for name, term in terms.items()}, "cost/expert": cost}
 
     def _pictures(self, frames: NDArray[np.uint8]) -> torch.Tensor:
         """uint8 `[N, H, W, 3]` to float32 `[N, 3, H, W]` in [-1, 1]."""
         # Channels come last in memory, which the convolutions keep.
-        return torch.from_numpy(frames).to(self.device).permute(0, 3, 1, 2).float() / 127.5 - 1
+        return self._on_device(frames).permute(0, 3, 1, 2).float() / 127.5 - 1

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import torch
 
+from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
 from bootifol.rewards.gaifo import losses
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.gaifo.networks import Discriminator
 from bootifol.rewards.gaifo.stacks import as_pictures, draw_stacks, stack_frames
 from bootifol.rewards.learned import LearnedRewardModel
-from bootifol.types import FrameBatch, Metrics, Rewards, Video, VideoSource
+from bootifol.types import FrameBatch, Metrics, Rewards, StepMetrics, Video, VideoSource
 
 LABEL_BATCH = 256
 """Stacks rewarded at once, which bounds the memory that a long video takes."""
@@ -60,7 +61,7 @@ class GaifoRewardModel(LearnedRewardModel[GaifoConfig, Discriminator]):
                 self._logits(as_pictures(frames[part]))
                 for part in np.split(indices, range(LABEL_BATCH, len(indices), LABEL_BATCH))
             ]
-            return losses.reward(torch.cat(logits), self.config.reward).cpu().numpy()
+            return to_host(losses.reward(torch.cat(logits), self.config.reward))
 
     def _step(self, expert: VideoSource, other: VideoSource) -> Metrics:
         """Algorithm 1, "update the discriminator": sample as many stacks of either class, go down L_D once."""
@@ -80,7 +81,7 @@ class GaifoRewardModel(LearnedRewardModel[GaifoConfig, Discriminator]):
         self.version += 1
         return metrics
 
-    def _loss(self, expert: FrameBatch, other: FrameBatch) -> tuple[torch.Tensor, Metrics]:
+    def _loss(self, expert: FrameBatch, other: FrameBatch) -> tuple[torch.Tensor, StepMetrics]:
         """L_D and the metrics on stacks of both classes, uint8 `[N, stack, H, W, 3]` each."""
         pictures = as_pictures(np.concatenate([expert, other]))
         expert_logits, other_logits = self._logits(pictures).chunk(2)
@@ -88,14 +89,14 @@ class GaifoRewardModel(LearnedRewardModel[GaifoConfig, Discriminator]):
         with torch.no_grad():
             right = torch.cat([expert_logits > 0, other_logits <= 0]).float().mean()
             return loss, {
-                "loss/discriminator": float(loss),
-                "discriminator/accuracy": float(right),
-                "discriminator/expert": float(torch.sigmoid(expert_logits).mean()),
-                "discriminator/other": float(torch.sigmoid(other_logits).mean()),
+                "loss/discriminator": loss,
+                "discriminator/accuracy": right,
+                "discriminator/expert": torch.sigmoid(expert_logits).mean(),
+                "discriminator/other": torch.sigmoid(other_logits).mean(),
             }
 
     def _logits(self, pictures: torch.Tensor) -> torch.Tensor:
         """Float32 logits `[N]` of stacks `[N, 3 * stack, H, W]`."""
         with self._autocast():
-            logits: torch.Tensor = self.networks(pictures.to(self.device))
+            logits: torch.Tensor = self.networks(to_device(pictures, self.device))
             return logits.float()

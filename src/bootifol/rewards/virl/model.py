@@ -8,13 +8,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from bootifol.devices import to_host
 from bootifol.rewards.learned import LearnedRewardModel
 from bootifol.rewards.video_checks import check_references
 from bootifol.rewards.virl import losses
 from bootifol.rewards.virl.config import VirlConfig
 from bootifol.rewards.virl.networks import VirlNetworks
 from bootifol.rewards.virl.sampling import Draw, draw
-from bootifol.types import Arrays, FrameBatch, Frames, Metrics, Rewards, Video, VideoSource
+from bootifol.types import Arrays, FrameBatch, Frames, Metrics, Rewards, StepMetrics, Video, VideoSource
 
 PAIR = 2
 """Eq. (4) reconstructs the anchor and its positive. Positives come from the same videos as anchors, so every anchor is
@@ -70,25 +71,24 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
         for reference in references:
             expert_frames, expert_sequences = (part[:length] for part in self._encodings[reference.name])
             distances.append(self._distance(frames - expert_frames, sequences - expert_sequences))
-        return -torch.stack(distances).mean(0)[1:].numpy()
+        return to_host(-torch.stack(distances).mean(0)[1:])
 
     def embed(self, frames: Frames) -> NDArray[np.float32]:
         """e and h of a video, side by side: `[T + 1, H, W, 3]` to `[T + 1, 256]`."""
-        encodings: NDArray[np.float32] = torch.cat(self._encode(frames), dim=1).numpy()
-        return encodings
+        return to_host(torch.cat(self._encode(frames), dim=1))
 
     def load_state(self, arrays: Arrays) -> None:
         """The inverse of `state`."""
         super().load_state(arrays)
         self._encodings.clear()
 
-    def _losses(self, videos: FrameBatch, drawn: Draw) -> tuple[torch.Tensor, Metrics]:
+    def _losses(self, videos: FrameBatch, drawn: Draw) -> tuple[torch.Tensor, StepMetrics]:
         """L and its terms on n expert videos followed by n of the agent, uint8 `[2n, T' + 1, H, W, 3]`."""
         config = self.config
         count, length = videos.shape[:2]
         pictures = self._pictures(videos.reshape(-1, *videos.shape[2:]))
         by_video = pictures.view(count, length, *pictures.shape[1:])
-        noisy = self._with_noise(by_video[self._indices(drawn.noisy)])
+        noisy = self._with_noise(by_video[self._on_device(drawn.noisy)])
         with self._autocast():
             frames = self.networks.encode_frames(torch.cat([pictures, noisy.flatten(0, 1)]))
         pool = frames.view(-1, length, frames.shape[1])
@@ -108,7 +108,7 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
             name: losses.siamese_loss(*encodings, config.margin, config.distance)
             for name, encodings in compared.items()
         }
-        decoded = self._indices(drawn.decoded)
+        decoded = self._on_device(drawn.decoded)
         rows = torch.arange(count, device=self.device)[:, None]
         targets = by_video[rows, decoded].flatten(0, 1)
         if config.sequence_reconstruction_weight > 0:
@@ -127,15 +127,15 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
                 "negative": torch.linalg.vector_norm(h_anchor - h_negative, dim=1),
             }
         return total, {
-            **{f"loss/{name}": float(term.detach()) for name, term in terms.items()},
-            **{f"distance/{name}": float(distance.mean()) for name, distance in distances.items()},
+            **{f"loss/{name}": term for name, term in terms.items()},
+            **{f"distance/{name}": distance.mean() for name, distance in distances.items()},
         }
 
     def _reordered(
         self, pool: torch.Tensor, videos: NDArray[np.int64], frames: NDArray[np.int64]
     ) -> torch.Tensor:
         """Encodings of frames `[B, T' + 1]` of the videos `[B]` of a pool `[N, T' + 1, 128]`."""
-        return pool[self._indices(videos)[:, None], self._indices(frames)]
+        return pool[self._on_device(videos)[:, None], self._on_device(frames)]
 
     def _reconstruction(self, pictures: torch.Tensor, encodings: torch.Tensor) -> torch.Tensor:
         """Of pictures `[N, 3, H, W]` from encodings of frames `[2n, F, 128]`, with N = 2n F."""
@@ -156,17 +156,14 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
         with self._evaluating():
             with self._autocast():
                 encodings = self.networks.encode_frames(self._pictures(self._checked(frames)))
-            return encodings.cpu(), self.networks.encode_sequences(encodings[None])[0].cpu()
+            return encodings, self.networks.encode_sequences(encodings[None])[0]
 
     def _pictures(self, frames: Frames) -> torch.Tensor:
         """uint8 `[N, H, W, 3]` to `[N, 3, H, W]` in [0, 1], channels last in memory."""
         dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32
-        return torch.from_numpy(frames).to(self.device).permute(0, 3, 1, 2).to(dtype) / 255
+        return self._on_device(frames).permute(0, 3, 1, 2).to(dtype) / 255
 
     def _with_noise(self, pictures: torch.Tensor) -> torch.Tensor:
         """Videos `[k, T' + 1, 3, H, W]` with Gaussian noise on every number."""
-        noise = torch.from_numpy(self._rng.standard_normal(tuple(pictures.shape), dtype=np.float32))
+        noise = self._on_device(self._rng.standard_normal(tuple(pictures.shape), dtype=np.float32))
         return pictures + self.config.noise * noise.to(pictures)
-
-    def _indices(self, indices: NDArray[np.int64]) -> torch.Tensor:
-        return torch.from_numpy(indices).to(self.device)
