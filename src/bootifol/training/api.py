@@ -20,6 +20,7 @@ from bootifol.evaluation.summary import Summary, summarize
 from bootifol.files import written_aside
 from bootifol.presets import preset as preset_named
 from bootifol.reports.html import report
+from bootifol.rewards.registry import check_method
 from bootifol.training.checkpoint import load_checkpoint, newest_checkpoint
 from bootifol.training.components import (
     build_agent,
@@ -173,8 +174,9 @@ def write_scores(path: Path, scores: dict[str, Rewards]) -> None:
 
 
 def _run_with_demos(directory: Path | str) -> RunConfig:
-    """A run's configuration, once its videos are seen to be where it looks for them."""
+    """A run's configuration, once its method and its videos are seen to be where it looks for them."""
     run = RunConfig.read(Path(directory))
+    check_method(run.method)
     if not Path(run.demos).is_dir():
         raise BootifolError(
             f"the videos that {directory} learns from are not at {run.demos}: give the command in the directory in "
