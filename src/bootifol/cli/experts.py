@@ -32,7 +32,7 @@ def train(
         seed: Of everything random.
         learning_rate: Of Adam.
         discount: Of future rewards, an agent step.
-        agent_steps_per_update: 1 learns most from each agent step, 2 or more from each minute.
+        agent_steps_per_update: Agent steps for each update of actor and critics, which takes many times as long.
         n_step: Agent steps whose rewards are summed before a critic estimates what follows.
         episode_steps: Agent steps of a training episode, by default as many as are evaluated; shorter ones show more
             starts, which is what rare rewards need.

@@ -48,7 +48,7 @@ class ExpertConfig:
     discount: float = 0.99
     learning_rate: float = 3e-4
     agent_steps_per_update: int = 1
-    """Agent steps for each update of actor and critics; 1 learns most from each step, 2 or more from each minute."""
+    """Agent steps for each update of actor and critics; an update takes many times as long as a step."""
     n_step: int = 1
     """Agent steps whose rewards are summed before critics estimate the rest; rare rewards spread faster with 3."""
     episode_steps: int | None = None
@@ -57,7 +57,7 @@ class ExpertConfig:
     evaluation_every: int = 10_000
     """Agent steps between two evaluations; each also writes a checkpoint."""
     evaluation_episodes: int = 20
-    """From starts that are the same every time. Of 10, a policy that failed from 15 of 50 others failed from none."""
+    """From starts that are the same every time, and many enough that the best evaluation is not the luckiest."""
     threads: int = 1
 
     def __post_init__(self) -> None:
