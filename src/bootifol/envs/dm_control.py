@@ -12,6 +12,9 @@ from bootifol.envs.camera import Camera, load_mujoco, no_rendering
 from bootifol.envs.pictures import PictureConfig
 from bootifol.types import Action, Frame
 
+_WHOLE_TURNS = {"hopper": 1}
+"""Domains whose observation holds an angle that turns without end, and where in the state it is."""
+
 
 class DMControlSimulator:
     """A task of the suite.
@@ -37,6 +40,7 @@ class DMControlSimulator:
         self.action_dim = int(np.prod(specification.shape))
         self.step_seconds = float(self.environment.control_timestep())
         self._low, self._high = specification.minimum, specification.maximum
+        self._turning = _WHOLE_TURNS.get(domain)
         # The suite's own pixels wrapper films every task with its first camera, too.
         self._camera = Camera(self.physics.model.ptr, pictures.picture_size, pictures.profile, camera=0)
 
@@ -56,9 +60,16 @@ class DMControlSimulator:
         return float(step.reward or 0.0), bool(step.last()), None
 
     def state(self) -> NDArray[np.float32]:
-        """What the suite shows an agent that does not see: positions, velocities and the like, `[S]`."""
+        """What the suite shows an agent that does not see: positions, velocities and the like, `[S]`.
+
+        Cosine and sine stand for an angle that turns without end: turned over once, Hopper is where it was, and an
+        expert that can rise from its back can rise from its front by rolling over.
+        """
         parts = self.environment.task.get_observation(self.physics).values()
         flat: NDArray[np.float32] = np.concatenate([np.ravel(part) for part in parts]).astype(np.float32)
+        if self._turning is not None:
+            angle = flat[self._turning]
+            flat = np.append(np.delete(flat, self._turning), [np.cos(angle), np.sin(angle)]).astype(np.float32)
         return flat
 
     def render(self) -> Frame:
