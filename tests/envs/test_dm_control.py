@@ -53,3 +53,19 @@ def test_the_time_limit_is_ours_even_beyond_the_suites() -> None:
         assert not (terminated or truncated)
     np.testing.assert_array_equal(simulator.physics.data.geom("target").xpos, where)  # type: ignore[attr-defined]
     environment.close()
+
+
+def test_a_whole_turn_leads_hoppers_state_back_to_where_it_was() -> None:
+    environment = make_environment("hopper_stand", PictureConfig(8, 8, stack=1), 5)
+    environment.reset(seed=0)
+    simulator = environment.simulator
+    physics = simulator.physics  # type: ignore[attr-defined]
+    states = []
+    for angle in (0.5, 0.5 + 2 * np.pi, 1.0):
+        physics.named.data.qpos["rooty"] = angle
+        physics.forward()
+        states.append(simulator.state())  # type: ignore[attr-defined]
+    environment.close()
+    np.testing.assert_allclose(states[1], states[0], atol=1e-6)
+    np.testing.assert_allclose(states[2][-2:], [np.cos(1.0), np.sin(1.0)], rtol=1e-6)
+    assert len(states[0]) == 16

@@ -69,7 +69,9 @@ class DMControlSimulator:
         flat: NDArray[np.float32] = np.concatenate([np.ravel(part) for part in parts]).astype(np.float32)
         if self._turning is not None:
             angle = flat[self._turning]
-            flat = np.append(np.delete(flat, self._turning), [np.cos(angle), np.sin(angle)]).astype(np.float32)
+            flat = np.append(np.delete(flat, self._turning), [np.cos(angle), np.sin(angle)]).astype(
+                np.float32
+            )
         return flat
 
     def render(self) -> Frame:

@@ -149,11 +149,13 @@ def _keep_nearest(out: Path, rows: list[dict[str, str]], mean_return: float, nam
     StatePolicy.load(_policy_path(out, nearest)).save(out / f"{name}.safetensors")
 
 
-def evaluate_policy(policy: StatePolicy, environment: StateEnvironment, episodes: int) -> list[float]:
-    """Returns of so many episodes from fixed starts."""
+def evaluate_policy(
+    policy: StatePolicy, environment: StateEnvironment, episodes: int, first_seed: int = EVALUATION_SEED
+) -> list[float]:
+    """Returns of so many episodes from fixed starts, whose seeds count from the first."""
     returns = []
-    for number in range(episodes):
-        state, _ = environment.reset(seed=EVALUATION_SEED + number)
+    for seed in range(first_seed, first_seed + episodes):
+        state, _ = environment.reset(seed=seed)
         total, over = 0.0, False
         while not over:
             state, reward, terminated, truncated, _ = environment.step(policy(state))
