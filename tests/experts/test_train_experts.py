@@ -108,3 +108,20 @@ def test_training_episodes_may_be_shorter_than_those_that_are_evaluated(tmp_path
     assert np.flatnonzero(stored["replay/timeouts"]).tolist() == [6, 13, 20, 27]
     with pytest.raises(BootifolError, match="episode_steps must be at least 1, not 0"):
         replace(CONFIG, episode_steps=0)
+
+
+def test_shaping_adds_nothing_but_the_difference_of_potentials() -> None:
+    plain = StateEnvironment("hopper_stand", 30)
+    shaped = StateEnvironment("hopper_stand", 30, shaping=3.0, discount=0.5)
+    rng = np.random.default_rng(0)
+    for environment in (plain, shaped):
+        environment.reset(seed=1)
+    for _ in range(30):
+        before = plain._simulator.physics.height()
+        action = rng.uniform(-1, 1, 4).astype(np.float32)
+        (state, reward, *_), (same, more, *_) = plain.step(action), shaped.step(action)
+        np.testing.assert_array_equal(state, same)
+        after = plain._simulator.physics.height()
+        assert more == pytest.approx(reward + 3.0 * (0.5 * after - before))
+    with pytest.raises(BootifolError, match="reacher_hard has no potential .* hopper_stand has"):
+        StateEnvironment("reacher_hard", 30, shaping=1.0)

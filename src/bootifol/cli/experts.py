@@ -17,6 +17,7 @@ def train(
     agent_steps_per_update: int = 1,
     n_step: int = 1,
     episode_steps: int | None = None,
+    shaping: float = 0.0,
     threads: int = 1,
 ) -> int:
     """Train an expert from the simulator's states and its reward, to perform the task for recordings.
@@ -36,6 +37,8 @@ def train(
         n_step: Agent steps whose rewards are summed before a critic estimates what follows.
         episode_steps: Agent steps of a training episode, by default as many as are evaluated; shorter ones show more
             starts, which is what rare rewards need.
+        shaping: Weight of a potential that rises on the way to a reward which is 0 until the task is done; hopper_stand
+            has one, the height of its torso. Evaluations leave it out.
         threads: Threads PyTorch computes with.
     """
     from bootifol.experts.train import ExpertConfig, train_expert
@@ -51,6 +54,7 @@ def train(
         agent_steps_per_update=agent_steps_per_update,
         n_step=n_step,
         episode_steps=episode_steps,
+        shaping=shaping,
         threads=threads,
     )
     try:

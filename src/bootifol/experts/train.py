@@ -54,6 +54,9 @@ class ExpertConfig:
     episode_steps: int | None = None
     """Agent steps of a training episode; the task's evaluation length by default. Shorter ones show more starts, which
     is what rare rewards need; what would come later is estimated by the critics."""
+    shaping: float = 0.0
+    """Weight of a potential in the reward that is learned from, not in the returns of evaluations: in hopper_stand the
+    height of the torso, without which no reward says how to rise."""
     evaluation_every: int = 10_000
     """Agent steps between two evaluations; each also writes a checkpoint."""
     evaluation_episodes: int = 20
@@ -87,9 +90,10 @@ def train_expert(config: ExpertConfig, out: Path) -> StatePolicy:
     torch.set_num_threads(config.threads)
     _check_same(config, out)
     steps = task_named(config.task).evaluation_steps
-    environment, judged = (
-        StateEnvironment(config.task, length) for length in (config.episode_steps or steps, steps)
+    environment = StateEnvironment(
+        config.task, config.episode_steps or steps, config.shaping, config.discount
     )
+    judged = StateEnvironment(config.task, steps)
     model = _make_model(config, environment)
     rows = _read_rows(out / "curve.csv")
     if (out / "checkpoint").is_dir():
@@ -216,11 +220,11 @@ def _check_same(config: ExpertConfig, out: Path) -> None:
     path = out / "training.json"
     now: dict[str, Any] = asdict(config) | {"hidden_dims": list(config.hidden_dims)}
     if path.exists():
-        before = read_json(path, "the expert's training")["config"]
+        before = asdict(ExpertConfig(config.task)) | read_json(path, "the expert's training")["config"]
         changed = [
             name
             for name in now
-            if name not in ("agent_steps", "evaluation_episodes", "threads") and before.get(name) != now[name]
+            if name not in ("agent_steps", "evaluation_episodes", "threads") and before[name] != now[name]
         ]
         if changed:
             raise BootifolError(
