@@ -123,5 +123,5 @@ def test_shaping_adds_nothing_but_the_difference_of_potentials() -> None:
         np.testing.assert_array_equal(state, same)
         after = plain._simulator.physics.height()
         assert more == pytest.approx(reward + 3.0 * (0.5 * after - before))
-    with pytest.raises(BootifolError, match="reacher_hard has no potential .* hopper_stand has"):
+    with pytest.raises(BootifolError, match=r"reacher_hard has no potential .* hopper_stand has"):
         StateEnvironment("reacher_hard", 30, shaping=1.0)

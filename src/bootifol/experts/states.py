@@ -26,8 +26,8 @@ class StateEnvironment(gymnasium.Env[State, Action]):
     Args:
         task_name: from the catalogue; its simulator must have a method `state`.
         episode_steps: agent steps after which an episode is truncated.
-        shaping: weight w of a potential Φ in the reward, which becomes r + w (γ Φ(s') - Φ(s)); that changes which way is
-            found first and not which is best (Ng, Harada and Russell, 1999). 0 leaves the task's reward alone.
+        shaping: weight w of a potential Φ in the reward, which becomes r + w (γ Φ(s') - Φ(s)); that changes which way
+            is found first and not which is best (Ng, Harada and Russell, 1999). 0 leaves the task's reward alone.
         discount: γ in it, the learner's.
 
     Raises:
