@@ -104,9 +104,8 @@ TASKS = {
             action_repeat=2,
             episode_steps=60,
             evaluation_steps=500,
-            expert_return=None,
+            expert_return=908.5,
             random_return=2.2,
-            has_expert=False,
         ),
         Task(
             name="walker_run",
@@ -116,9 +115,8 @@ TASKS = {
             action_repeat=2,
             episode_steps=60,
             evaluation_steps=500,
-            expert_return=None,
+            expert_return=687.7,
             random_return=24.8,
-            has_expert=False,
         ),
         Task(
             name="button_press",
