@@ -148,7 +148,8 @@ def rank_all(
     order = list(TASKS)
     for task in tasks:
         about = {"task": task.name, **setup.columns()}
-        if any(about.items() <= row.items() for row in rows):
+        # Both: without its videos a task's panel of the picture would be empty.
+        if all(any(about.items() <= row.items() for row in table) for table in (rows, video_rows)):
             continue
         rewards = ranked(task, setup, demos, workers)
         described = {

@@ -58,7 +58,11 @@ def test_a_ranked_task_is_not_ranked_again_unless_the_settings_differ(
     assert "| `drawn_home` |" in capsys.readouterr().out
     main([*words(ranked), "--gradient-steps", "1"])
     assert [setup.gradient_steps for setup in asked] == [1]
-    assert len(read_rows(ranked / "rankings_videos.csv", VIDEO_COLUMNS)) == 12
+    videos = ranked / "rankings_videos.csv"
+    assert len(read_rows(videos, VIDEO_COLUMNS)) == 12
+    videos.unlink()
+    main([*words(ranked), "--gradient-steps", "1"])
+    assert len(asked) == 2 and len(read_rows(videos, VIDEO_COLUMNS)) == 12
 
 
 def test_a_task_without_an_expert_is_left_out_with_a_sentence(
