@@ -34,9 +34,6 @@ from bootifol.tasks import task_named
 JUDGING_SEED = 2 * EVALUATION_SEED
 """Seeds of the starts on which candidates are judged begin here."""
 
-FAR_ABOVE = 1e9
-"""No return is as high, so the nearest to it are the highest."""
-
 
 def judge(trained: Path, task: str, candidates: list[Row], episodes: int, what: str) -> dict[int, float]:
     """Mean returns of the policies of these evaluations, by their agent steps."""
@@ -70,13 +67,13 @@ def bundle(trained: Path, candidates: int, episodes: int, out: Path) -> dict[str
     if not curve:
         raise BootifolError(f"{trained} has no evaluation yet: go on with bootifol experts train")
 
-    def nearest(mean_return: float) -> list[Row]:
-        return sorted(curve, key=lambda row: abs(float(row["mean_return"]) - mean_return))[:candidates]
-
-    best = judge(trained, task, nearest(FAR_ABOVE), episodes, "the best")
+    praised = sorted(curve, key=lambda row: -float(row["mean_return"]))[:candidates]
+    best = judge(trained, task, praised, episodes, "the best")
     expert = max(best, key=lambda steps: best[steps])
-    halves = judge(trained, task, nearest(best[expert] / 2), episodes, "half-trained")
-    half = min(halves, key=lambda steps: abs(halves[steps] - best[expert] / 2))
+    wanted = best[expert] / 2
+    nearest = sorted(curve, key=lambda row: abs(float(row["mean_return"]) - wanted))[:candidates]
+    halves = judge(trained, task, nearest, episodes, "half-trained")
+    half = min(halves, key=lambda steps: abs(halves[steps] - wanted))
     described: dict[str, Any] = training | {
         "judged_episodes": episodes,
         "expert": {"agent_steps": expert, "mean_return": round(best[expert], 2)},
