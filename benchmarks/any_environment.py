@@ -3,10 +3,10 @@
     python -m benchmarks.any_environment pendulum --out runs/pendulum --time-budget 40m
     python -m benchmarks.any_environment reacher --out runs/reacher_v5 --time-budget 40m
 
-Pendulum-v1 needs no MuJoCo, Reacher-v5 does; both need `pip install 'bootifol[gymnasium]'`. The experts below read the
-simulator's state. They are filmed by Gymnasium's renderer at its full size and speed, as any user would film theirs;
-from there on this script only types the commands that a user would type, and prints them. What is there already is not
-done again.
+Pendulum-v1 needs no MuJoCo and is named by its ID; Reacher-v5 does, and a function below makes it, with a camera of its
+own. Both need `pip install 'bootifol[gymnasium]'`. The experts below read the simulator's state. They are filmed by
+Gymnasium's renderer at its full size and speed, as any user would film theirs; from there on this script only types the
+commands that a user would type, and prints them. What is there already is not done again.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ Controller = Callable[[Any], NDArray[np.float64]]
 class Example:
     """An environment and how to learn it."""
 
-    identifier: str
+    task: str
+    """As commands name it."""
     expert: Controller
     action_repeat: int
     episode_steps: int
@@ -45,16 +46,18 @@ class Example:
 
 
 def swing_up(environment: Any) -> NDArray[np.float64]:
-    """Pendulum: pumps energy until the pole is nearly up, then holds it there with a spring and a damper."""
+    """Pendulum: pumps energy until the pole is nearly up, then holds it there with a spring and a damper.
+
+    It pushes the less, the less energy is missing. A push of full strength to either side would return as much and
+    change sides within an agent step, which no agent that acts once in that time could imitate.
+    """
     angle, velocity = environment.state  # 0 is upright
     angle = (angle + np.pi) % (2 * np.pi) - np.pi
     gravity, mass, length = environment.g, environment.m, environment.l
     energy = mass * length**2 * velocity**2 / 6 + mass * gravity * length * (np.cos(angle) - 1) / 2
-    if abs(angle) < 0.5 and abs(velocity) < 4.0:
-        torque = -12.0 * angle - 3.0 * velocity
-    else:
-        # The energy is 0 when the pole stands still on top; at rest any push will do.
-        torque = -np.sign(energy) * environment.max_torque * (np.sign(velocity) or 1.0)
+    near = abs(angle) < 0.5 and abs(velocity) < 4.0
+    # The energy is 0 when the pole stands still on top.
+    torque = -12.0 * angle - 3.0 * velocity if near else -0.5 * energy * velocity
     return np.array([np.clip(torque, -environment.max_torque, environment.max_torque)])
 
 
@@ -75,9 +78,25 @@ def reach(environment: Any) -> NDArray[np.float64]:
     return torque
 
 
+def reacher_from_above() -> gymnasium.Env[Any, Any]:
+    """Reacher-v5 with a camera that fills the picture with what matters: its own shows the target as one pixel of 64²,
+    and none of what a torque does to the arm in one step.
+    """
+    camera = {
+        "distance": 0.75,
+        "azimuth": 90.0,
+        "elevation": -90.0,
+        "lookat": np.zeros(3),
+        "trackbodyid": -1,
+    }
+    return gymnasium.make("Reacher-v5", render_mode="rgb_array", default_camera_config=camera)
+
+
 EXAMPLES = {
-    "pendulum": Example("Pendulum-v1", swing_up, action_repeat=2, episode_steps=60),
-    "reacher": Example("Reacher-v5", reach, action_repeat=1, episode_steps=50),
+    "pendulum": Example("gymnasium:Pendulum-v1", swing_up, action_repeat=2, episode_steps=60),
+    "reacher": Example(
+        "benchmarks.any_environment:reacher_from_above", reach, action_repeat=2, episode_steps=40
+    ),
 }
 
 
@@ -87,10 +106,10 @@ def film(example: Example, directory: Path, episodes: int) -> float:
     Returns:
         Frames per second.
     """
-    simulator = GymnasiumSimulator(f"gymnasium:{example.identifier}", PictureConfig())
+    simulator = GymnasiumSimulator(example.task, PictureConfig())
     environment: gymnasium.Env[Any, Any] = simulator.environment
     returns = []
-    with progress(f"filming the expert of {example.identifier}", episodes) as advance:
+    with progress(f"filming the expert of {example.task}", episodes) as advance:
         for number in range(episodes):
             path = directory / f"{number:04d}.mp4"
             if not path.exists():
@@ -140,25 +159,24 @@ def main() -> None:
     arguments = parser.parse_args()
     example, out = EXAMPLES[arguments.environment], arguments.out
     videos, demos, run = out / "videos", out / "demos", out / "run"
-    task = f"gymnasium:{example.identifier}"
     lengths = ["--action-repeat", str(example.action_repeat), "--episode-steps", str(example.episode_steps)]
     rate = film(example, videos, arguments.episodes) / example.action_repeat
     if not demos.exists():
         shape = ["--fps", f"{rate:g}", "--frames", str(example.episode_steps + 1)]
         typed("demos", "import", str(videos), "--out", str(demos), *shape, "--windows", "first")
-    typed("demos", "check", str(demos), "--task", task, *lengths)
+    typed("demos", "check", str(demos), "--task", example.task, *lengths)
     if (run / "config.json").exists():
         typed("train", "--resume", str(run))
     else:
         typed(
-            *("train", "--task", task, *lengths, "--demos", str(demos), "--out", str(run)),
+            *("train", "--task", example.task, *lengths, "--demos", str(demos), "--out", str(run)),
             *("--preset", arguments.preset, "--time-budget", arguments.time_budget),
             *("--threads", arguments.threads),
         )
     if not (run / "report.html").exists():  # the last thing a run writes; Ctrl-C made it stop before
         raise KeyboardInterrupt
     typed("evaluate", str(run), "--episodes", "10")
-    typed("tasks", task, "--measure", "10")
+    typed("tasks", example.task, "--measure", "10")
 
 
 if __name__ == "__main__":
