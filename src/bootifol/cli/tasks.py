@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
+import rich.box
 import tyro
 from rich.console import Console
 from rich.table import Table
@@ -24,7 +25,7 @@ def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure:
     """
     if measure < 0:
         raise BootifolError(f"--measure is a number of episodes, not {measure}")
-    catalogue = Table("task", "suite", "repeat", "steps", "evaluated", "expert", "random")
+    catalogue = _table("task", "suite", "repeat", "steps", "evaluated", "expert", "random")
     listed = [task_named(name) for name in names] or list(TASKS.values())
     for task in listed:
         catalogue.add_row(
@@ -36,8 +37,6 @@ def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure:
             "–" if task.expert_return is None else f"{task.expert_return:g}",
             "–" if task.random_return is None else f"{task.random_return:g}",
         )
-    for column in catalogue.columns[:2]:
-        column.no_wrap = True
     console = Console(emoji=False)
     console.print(catalogue)
     for task in listed:
@@ -58,6 +57,15 @@ def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure:
     return 0
 
 
+def _table(*headings: str) -> Table:
+    """Narrow enough for a terminal of 80 columns; only names, which may be long, are broken."""
+    table = Table(*headings, box=rich.box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    table.columns[0].overflow = "fold"
+    for column in table.columns[1:]:
+        column.no_wrap = True
+    return table
+
+
 def _measured(listed: Sequence[Task], episodes: int) -> Table:
     """Returns of each task's expert and of random actions, played now."""
     # Imported here: the simulators and scipy would slow down every other command's help.
@@ -69,7 +77,7 @@ def _measured(listed: Sequence[Task], episodes: int) -> Table:
     from bootifol.progress import progress
 
     behaviors: tuple[Behavior, ...] = ("expert", "random")
-    table = Table("task", "who", "episodes", "mean return ± std", "95% interval of the mean", "success")
+    table = _table("task", "who", "episodes", "mean return ± std", "95% interval", "success")
     for task in listed:
         environment = unseen_environment(task, task.evaluation_steps)
         for who in behaviors if task.has_expert else behaviors[1:]:
