@@ -56,6 +56,28 @@ def test_an_expert_that_always_holds_its_goal_stands_still_honestly(write_set: W
     assert check_demo_set(write_set(videos)).defects.half_frozen == ()
 
 
+def test_a_task_that_is_tiny_in_the_picture_is_told(write_set: WriteSet) -> None:
+    small, large = np.zeros((2, 2, FRAMES, 64, 64, 3), np.uint8)
+    size = {"video_size": 64, "agent_size": 64}
+    for t in range(FRAMES):
+        small[:, t, 30:32, 4 * t : 4 * t + 2] = 255
+        large[:, t, 30:34, 4 * t : 4 * t + 4] = 255
+    small[1, :, 0, 0], large[1, :, 0, 0] = 255, 255  # not the same video twice
+    checked = check_demo_set(write_set(small, name="small", **size))
+    assert checked.defects.little_motion == 8 / 64**2
+    assert any(sentence.startswith("only 0.2% of the picture") for sentence in checked.defects.sentences())
+    assert check_demo_set(write_set(large, name="large", **size)).defects.little_motion is None
+    random = check_demo_set(write_set(small, name="random", behavior="random", **size))
+    assert random.defects.little_motion is None, "what the expert does is what matters"
+
+
+def test_many_groups_of_nearly_the_same_videos_are_one_sentence() -> None:
+    groups = tuple((f"a{number}", f"b{number}") for number in range(4))
+    assert len(Defects(near_duplicates=groups[:3]).sentences()) == 3
+    [sentence] = Defects(near_duplicates=groups).sentences()
+    assert sentence.startswith("8 videos look nearly like another, in 4 groups")
+
+
 def test_an_imported_video_is_named_with_its_file(write_set: WriteSet) -> None:
     directory = write_set(moving_videos(1)[:, :1].repeat(FRAMES, axis=1))
     manifest = read_manifest(directory)

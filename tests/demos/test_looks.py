@@ -40,6 +40,14 @@ def test_a_slow_motion_is_no_stillness() -> None:
     assert look_at(video).still_at_end < 0.2
 
 
+def test_the_pixels_that_change_in_a_step_are_counted_while_something_moves() -> None:
+    two_columns_of_the_block = 2 * 6 / 32**2
+    assert look_at(walking_block()).moving_pixels == two_columns_of_the_block
+    assert look_at(walking_block(moves=range(8, 14))).moving_pixels == two_columns_of_the_block
+    assert look_at(walking_block(moves=range(0))).moving_pixels == 0.0
+    assert look_at(walking_block()[:1]).moving_pixels == 0.0
+
+
 def test_blank_pictures_are_counted_and_are_no_cut() -> None:
     video = walking_block()
     video[0], video[1], video[-1] = 0, 255, (0, 0, 200)

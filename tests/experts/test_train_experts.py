@@ -13,7 +13,7 @@ from bootifol.errors import BootifolError
 from bootifol.experts.policy import StatePolicy
 from bootifol.experts.states import StateEnvironment
 from bootifol.experts.train import ExpertConfig, extract_policy, train_expert
-from bootifol.files import read_arrays
+from bootifol.files import read_arrays, read_json
 from bootifol.tasks import TASKS
 
 pytest.importorskip("sb3_contrib")
@@ -73,6 +73,39 @@ def test_training_goes_on_where_it_stopped(tmp_path: Path, n_step: int) -> None:
     assert (tmp_path / "run" / "expert.safetensors").exists()
     with pytest.raises(BootifolError, match=r"another expert \(different: seed\)"):
         train_expert(replace(CONFIG, seed=2, n_step=n_step), tmp_path / "run")
+
+
+@pytest.mark.usefixtures("short_episodes")
+def test_a_training_starts_from_another_with_other_settings(tmp_path: Path) -> None:
+    first = replace(CONFIG, agent_steps=30)
+    train_expert(first, tmp_path / "first")
+    kept = {path: path.read_bytes() for path in (tmp_path / "first").rglob("*") if path.is_file()}
+    second = replace(CONFIG, agent_steps=90, n_step=3, target_entropy=-4.0)
+    for _ in range(2):  # the second call finds nothing left to do
+        train_expert(second, tmp_path / "second", start_from=tmp_path / "first")
+    assert {path: path.read_bytes() for path in kept} == kept, "the first training is as it was"
+    with (tmp_path / "second" / "curve.csv").open(newline="") as file:
+        assert [row["agent_steps"] for row in csv.DictReader(file)] == ["30", "60", "90"]
+    description = read_json(tmp_path / "second" / "training.json", "the training")
+    assert description["config"]["target_entropy"] == -4.0
+    assert description["before"]["config"]["target_entropy"] is None
+    assert description["before"]["agent_steps"] == 30
+
+
+@pytest.mark.usefixtures("short_episodes")
+def test_what_cannot_be_started_from_gets_a_sentence(tmp_path: Path) -> None:
+    train_expert(replace(CONFIG, agent_steps=30), tmp_path / "first")
+    with pytest.raises(BootifolError, match="its algorithm, hidden_dims are different"):
+        other = replace(CONFIG, algorithm="CrossQ", hidden_dims=(4, 4))
+        train_expert(other, tmp_path / "other", start_from=tmp_path / "first")
+    with pytest.raises(BootifolError, match="training to start from"):
+        train_expert(CONFIG, tmp_path / "other", start_from=tmp_path / "none")
+    assert not (tmp_path / "other").exists()
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("keep me")
+    with pytest.raises(BootifolError, match="choose another directory"):
+        train_expert(CONFIG, tmp_path / "mine", start_from=tmp_path / "first")
+    assert (tmp_path / "mine" / "notes.txt").read_text() == "keep me"
 
 
 @pytest.mark.usefixtures("short_episodes")

@@ -17,7 +17,9 @@ def train(
     agent_steps_per_update: int = 1,
     n_step: int = 1,
     episode_steps: int | None = None,
+    target_entropy: float | None = None,
     shaping: float = 0.0,
+    start_from: Path | None = None,
     threads: int = 1,
 ) -> int:
     """Train an expert from the simulator's states and its reward, to perform the task for recordings.
@@ -37,8 +39,12 @@ def train(
         n_step: Agent steps whose rewards are summed before a critic estimates what follows.
         episode_steps: Agent steps of a training episode, by default as many as are evaluated; shorter ones show more
             starts, which is what rare rewards need.
+        target_entropy: Mean entropy in nats that the noise of actions is steered to; minus the number of action
+            dimensions by default. Less at the end of a training makes the mean action better.
         shaping: Weight of a potential that rises on the way to a reward which is 0 until the task is done; hopper_stand
             has one, the height of its torso. Evaluations leave it out.
+        start_from: Directory of a training of the same task, algorithm and networks: begin with what it learned and
+            with its replay, and go on with other settings.
         threads: Threads PyTorch computes with.
     """
     from bootifol.experts.train import ExpertConfig, train_expert
@@ -54,11 +60,12 @@ def train(
         agent_steps_per_update=agent_steps_per_update,
         n_step=n_step,
         episode_steps=episode_steps,
+        target_entropy=target_entropy,
         shaping=shaping,
         threads=threads,
     )
     try:
-        train_expert(config, out)
+        train_expert(config, out, start_from)
     except KeyboardInterrupt:
         print("\nstopped; run the same command again and it goes on from its last evaluation")
         return 130

@@ -31,6 +31,13 @@ USUAL_STILLNESS = 0.25
 """Where half of the videos stand still at their end for less than this, one that does for `LONG_STILLNESS` is odd. An
 expert that holds its goal stands still for two thirds of every video, and that is no fault."""
 
+FEW_GROUPS = 3
+"""Groups of nearly the same videos that get a sentence each; more are one sentence."""
+
+LITTLE_MOTION = 0.007
+"""Share of the picture that changes in a step below which a task is hard to see: 29 pixels of 64×64. The catalogue's
+experts change 66 or more; Reacher-v5 through its own camera 11, from which no action could be inferred."""
+
 
 @dataclass(frozen=True)
 class Defects:
@@ -48,6 +55,8 @@ class Defects:
     """With pictures that are black, white or of any one color."""
     cut: tuple[str, ...] = ()
     """Going over to another scene, and the frame where they do."""
+    little_motion: float | None = None
+    """Share of the picture that changes in a step of most videos, where that is too little to learn from."""
 
     def sentences(self) -> list[str]:
         """One sentence a defect, with what to do."""
@@ -55,17 +64,31 @@ class Defects:
             f"the same video {len(names)} times: {listed(names)}; keep one of them"
             for names in self.duplicates
         ]
-        found += [
-            f"nearly the same video {len(names)} times (compressed again?): {listed(names)}; keep one of them"
-            for names in self.near_duplicates
-        ]
+        if len(self.near_duplicates) <= FEW_GROUPS:
+            found += [
+                f"nearly the same video {len(names)} times (compressed again?): {listed(names)}; keep one of them"
+                for names in self.near_duplicates
+            ]
+        else:
+            alike = [name for names in self.near_duplicates for name in names]
+            found.append(
+                f"{len(alike)} videos look nearly like another, in {len(self.near_duplicates)} groups: keep one of "
+                f"each if they were compressed again; no fault where starts differ little. They are {listed(alike)}"
+            )
         advice = {
             "nothing moves in {}: leave them out, unless the task is to keep still": self.frozen,
             "nothing moves for more than half of {}: trim the waiting before you import": self.half_frozen,
             "some pictures are black, white or of one color in {}: trim fades and title pages": self.blank,
             "the whole picture changes at once in {}: split the file at the cut, one scene a file": self.cut,
         }
-        return found + [sentence.format(listed(names)) for sentence, names in advice.items() if names]
+        found += [sentence.format(listed(names)) for sentence, names in advice.items() if names]
+        if self.little_motion is not None:
+            found.append(
+                f"only {self.little_motion:.1%} of the picture changes in a step: let the task fill it, with the "
+                "camera closer or the videos cropped, and the environment shown the same way; if motions are slow, "
+                "take fewer pictures a second"
+            )
+        return found
 
 
 @dataclass(frozen=True)
@@ -135,6 +158,8 @@ def find_defects(manifest: Manifest, looks: Sequence[Looks]) -> Defects:
         or (usually and 1.0 > video.still_at_end > LONG_STILLNESS)
     ]
     still = manifest.behavior == "still"
+    motions = [video.moving_pixels for index, video in enumerate(looks) if index not in frozen]
+    motion = float(np.median(motions)) if motions and manifest.behavior == "expert" else 1.0
     return Defects(
         duplicates=tuple(_named(entries, indices) for indices in by_pixels.values() if len(indices) > 1),
         near_duplicates=tuple(_named(entries, [compared[place] for place in group]) for group in near),
@@ -146,6 +171,7 @@ def find_defects(manifest: Manifest, looks: Sequence[Looks]) -> Defects:
             for entry, video in zip(entries, looks, strict=True)
             if video.cut is not None
         ),
+        little_motion=motion if motion < LITTLE_MOTION else None,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,13 @@ CUT_SHARE = 0.5
 USUAL_SHARE = 0.1
 """But only where half of the frames change less than this: a camera on the move is no cut."""
 
+CHANGED_LEVELS = 24
+"""A pixel that changes by more in any channel from one frame to the next is counted: noise of a camera or of
+compression is less."""
+
+MOVING_SHARE = 0.1
+"""Frames in which fewer pixels change than this share of the most that ever change at once stand still."""
+
 
 @dataclass(frozen=True)
 class Looks:
@@ -47,6 +55,9 @@ class Looks:
 
     still_at_end: float
     """The time after the last motion, as a share of the video; 1 when nothing ever moves."""
+
+    moving_pixels: float
+    """Share of the picture's pixels that change from one frame to the next while something moves, a median."""
 
     blank: int
     """Frames that are black, white or of any one color."""
@@ -70,6 +81,7 @@ def look_at(frames: Frames) -> Looks:
         digest=cells[chosen].round().astype(np.uint8),
         still_before_motion=before,
         still_at_end=end,
+        moving_pixels=_moving_pixels(frames),
         blank=int(blank.sum()),
         cut=_cut(cells, blank),
     )
@@ -98,6 +110,19 @@ def _still_shares(cells: NDArray[np.float32]) -> tuple[float, float]:
             longest = max(longest, t - start)
             start = t
     return longest / len(cells), (len(cells) - start) / len(cells)
+
+
+def _moving_pixels(frames: Frames) -> float:
+    if len(frames) < 2:
+        return 0.0
+    changed = np.array(
+        [
+            # Differences of uint8 would wrap around.
+            (np.maximum(before, after) - np.minimum(before, after) > CHANGED_LEVELS).any(-1).mean()
+            for before, after in pairwise(frames)
+        ]
+    )
+    return float(np.median(changed[changed >= MOVING_SHARE * changed.max()]))
 
 
 def _cut(cells: NDArray[np.float32], blank: NDArray[np.bool_]) -> int | None:

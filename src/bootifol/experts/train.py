@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import importlib
+import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,6 +33,9 @@ Algorithm = Literal["SAC", "TQC", "CrossQ"]
 EVALUATION_SEED = 10**6
 """Seeds of evaluation starts begin here, so that they are none of `bootifol tasks --measure`."""
 
+_SAME_TO_START = ("task", "algorithm", "hidden_dims")
+"""What a training must have in common with the one that it starts from: the checkpoint fits no other."""
+
 COLUMNS = ("agent_steps", "seconds", "mean_return", "lowest_return")
 
 
@@ -54,6 +58,9 @@ class ExpertConfig:
     episode_steps: int | None = None
     """Agent steps of a training episode; the task's evaluation length by default. Shorter ones show more starts, which
     is what rare rewards need; what would come later is estimated by the critics."""
+    target_entropy: float | None = None
+    """Entropy in nats that the noise of actions is steered to; minus the number of action dimensions by default. With
+    less of it the mean action, which is what is kept, can do what noise would ruin."""
     shaping: float = 0.0
     """Weight of a potential in the reward that is learned from, not in the returns of evaluations: in hopper_stand the
     height of the torso, without which no reward says how to rise."""
@@ -77,17 +84,26 @@ class ExpertConfig:
             require_at_least(1, **{"experts episode_steps": self.episode_steps})
 
 
-def train_expert(config: ExpertConfig, out: Path) -> StatePolicy:
+def train_expert(config: ExpertConfig, out: Path, start_from: Path | None = None) -> StatePolicy:
     """Trains an expert and keeps the best policy that an evaluation saw.
+
+    Args:
+        config: see there.
+        out: directory of the training; the same call goes on with what is there.
+        start_from: directory of another training of the task, with the same algorithm and networks, from whose
+            checkpoint and replay this one begins. `training.json` keeps what it was trained with under `before`.
 
     In `out`: `expert.safetensors` (the policy), `half_trained.safetensors` (the one whose return was nearest to half of
     its), `curve.csv` (an evaluation a row), `training.json` (configuration and versions), `policies/` (the policy of
     every evaluation), `checkpoint/` (with which the same call goes on).
 
     Raises:
-        BootifolError: stable-baselines3 is missing, or `out` holds the training of another expert.
+        BootifolError: stable-baselines3 is missing, `out` holds the training of another expert, or what is started from
+            does not fit.
     """
     torch.set_num_threads(config.threads)
+    if start_from is not None and not (out / "training.json").exists():
+        _start_from(start_from, config, out)
     _check_same(config, out)
     steps = task_named(config.task).evaluation_steps
     environment = StateEnvironment(
@@ -212,15 +228,56 @@ def _make_model(config: ExpertConfig, environment: StateEnvironment) -> Any:
         learning_starts=min(5000, config.agent_steps // 10),
         seed=config.seed,
         device="cpu",
+        target_entropy="auto" if config.target_entropy is None else config.target_entropy,
     )
+
+
+def _start_from(before: Path, config: ExpertConfig, out: Path) -> None:
+    """Copies a training as the beginning of this one."""
+    description = read_json(before / "training.json", "the training to start from")
+    settings = asdict(ExpertConfig(config.task)) | description["config"]
+    differing = [name for name in _SAME_TO_START if settings[name] != _plain(config)[name]]
+    if differing:
+        raise BootifolError(
+            f"{before} cannot be started from: its {', '.join(differing)} "
+            f"{'is' if len(differing) == 1 else 'are'} different"
+        )
+    if not (before / "checkpoint").is_dir():
+        raise BootifolError(
+            f"{before} has no checkpoint to start from: give it time for its first evaluation"
+        )
+    if out.is_dir() and any(out.iterdir()):
+        raise BootifolError(f"{out} is not empty and holds no training: choose another directory")
+    with written_aside(out) as aside:
+        aside.mkdir()
+        for name in ("checkpoint", "policies"):
+            shutil.copytree(before / name, aside / name)
+        shutil.copyfile(before / "curve.csv", aside / "curve.csv")
+        counts = read_json(before / "checkpoint" / "counts.json", "the expert's checkpoint")
+        _describe(config, aside, description | {"agent_steps": counts["num_timesteps"]})
+
+
+def _plain(config: ExpertConfig) -> dict[str, Any]:
+    return asdict(config) | {"hidden_dims": list(config.hidden_dims)}
+
+
+def _describe(config: ExpertConfig, out: Path, before: Any) -> None:
+    versions = {
+        name: importlib.import_module(name).__version__ for name in ("torch", "gymnasium", "mujoco", "numpy")
+    }
+    described = {"config": _plain(config), "versions": versions}
+    write_json(out / "training.json", described if before is None else described | {"before": before})
 
 
 def _check_same(config: ExpertConfig, out: Path) -> None:
     """Writes `training.json`, or compares with the one that is there; what no update depends on may change."""
     path = out / "training.json"
-    now: dict[str, Any] = asdict(config) | {"hidden_dims": list(config.hidden_dims)}
+    now = _plain(config)
+    started_from = None
     if path.exists():
-        before = asdict(ExpertConfig(config.task)) | read_json(path, "the expert's training")["config"]
+        described = read_json(path, "the expert's training")
+        started_from = described.get("before")
+        before = asdict(ExpertConfig(config.task)) | described["config"]
         changed = [
             name
             for name in now
@@ -231,10 +288,7 @@ def _check_same(config: ExpertConfig, out: Path) -> None:
                 f"{out} holds the training of another expert (different: {', '.join(changed)}): choose "
                 "another directory, or the same settings to go on with it"
             )
-    versions = {
-        name: importlib.import_module(name).__version__ for name in ("torch", "gymnasium", "mujoco", "numpy")
-    }
-    write_json(path, {"config": now, "versions": versions})
+    _describe(config, out, started_from)
 
 
 def _save_checkpoint(directory: Path, model: Any) -> None:
