@@ -106,6 +106,19 @@ def test_an_imported_set_states_how_it_was_made(tmp_path: Path) -> None:
     assert levels(DemoSet.open(tmp_path / "mine" / "expert")[1].frames) == [6, 7, 8, 9, 10, 11]
 
 
+def test_the_square_that_was_chosen_is_cut_out(tmp_path: Path) -> None:
+    frames = np.random.default_rng(0).integers(0, 256, (4, 12, 20, 3), np.uint8)
+    path = saved(tmp_path / "a.npy", frames)
+    conversion = Conversion(frames=4, size=8, crop=(9, 3, 8))
+    demo_set = import_videos([path], tmp_path / "mine" / "expert", conversion)
+    np.testing.assert_array_equal(demo_set[0].frames, frames[:, 3:11, 9:17])
+    assert demo_set.manifest.conversion is not None
+    assert demo_set.manifest.conversion["crop"] == [9, 3, 8]
+    with pytest.raises(BootifolError, match=r"a\.npy: a crop of 8×8 pixels at 13, 3 .* have 20×12"):
+        import_videos([path], tmp_path / "other", Conversion(frames=4, size=8, crop=(13, 3, 8)))
+    assert not (tmp_path / "other").exists()
+
+
 def test_every_bad_file_is_named_and_nothing_is_written(tmp_path: Path) -> None:
     good = saved(tmp_path / "good.npy", numbered(8))
     empty = tmp_path / "empty.mp4"
@@ -146,7 +159,10 @@ def test_files_of_different_rates_leave_the_rate_unknown(tmp_path: Path) -> None
     assert import_videos(files, tmp_path / "out", Conversion(4, 8)).manifest.frames_per_second is None
 
 
-@pytest.mark.parametrize("fields", [{"frames": 1}, {"size": 0}, {"frames_per_second": -1.0}])
-def test_impossible_conversions_are_refused(fields: dict[str, float]) -> None:
+@pytest.mark.parametrize(
+    "fields",
+    [{"frames": 1}, {"size": 0}, {"frames_per_second": -1.0}, {"crop": (-1, 0, 8)}, {"crop": (0, 0, 0)}],
+)
+def test_impossible_conversions_are_refused(fields: dict[str, object]) -> None:
     with pytest.raises(BootifolError):
         Conversion(**fields)  # type: ignore[arg-type]

@@ -14,7 +14,8 @@ from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.demos.record import record
 from bootifol.demos.video_writing import write_video
 from bootifol.errors import BootifolError
-from bootifol.training.api import score_videos
+from bootifol.training.api import read_videos, score_videos
+from bootifol.training.run_config import RunConfig
 
 SHORT = replace(TINY, interactive=replace(TINY.interactive, agent_steps=30))
 
@@ -54,3 +55,18 @@ def test_a_file_is_scored_as_the_video_that_an_import_makes_of_it(
     monkeypatch.chdir(tmp_path / "clips")
     with pytest.raises(BootifolError, match="are not at mine: give the command in the directory in which"):
         score_videos("../run", clips)
+
+
+def test_a_file_is_cropped_as_the_import_was(tmp_path: Path, demos: Path) -> None:
+    expert = DemoSet.open(demos / "expert")
+    size = PICTURES.video_size
+    scene = np.random.default_rng(0).integers(
+        0, 256, (len(expert[0].frames), size + 9, 2 * size, 3), np.uint8
+    )
+    np.save(tmp_path / "scene.npy", scene)
+    conversion = Conversion(len(scene), size, crop=(5, 9, size))
+    imported = import_videos([tmp_path / "scene.npy"], tmp_path / "mine" / "expert", conversion)
+    run = RunConfig("drawn_reach", "bootifol", "smoke", 1, str(tmp_path / "mine"), None, SHORT)
+    (video,) = read_videos(tmp_path / "scene.npy", run)
+    np.testing.assert_array_equal(video.frames, scene[:, 9:, 5 : 5 + size])
+    np.testing.assert_array_equal(video.frames, imported[0].frames)

@@ -73,6 +73,7 @@ def import_(
     out: Path,
     frames: int = 61,
     size: int = 64,
+    crop: tuple[int, int, int] | None = None,
     fps: float | None = None,
     windows: Literal["all", "first"] = "all",
     behavior: Literal["expert", "half_good", "random"] = "expert",
@@ -83,15 +84,16 @@ def import_(
     A .npz archive may hold one such array among others. A LeRobot dataset of format v3 (its directory) gives one
     video an episode: its pictures alone, never its actions or states.
 
-    The largest centered square of every picture is cut out and resized, after turning it upright, stretching pixels
-    that are not square, and putting white behind what is transparent. What was done to which file is written down
-    in OUT/BEHAVIOR/manifest.json, and OUT/BEHAVIOR/contact_sheet.png shows the result.
+    A square of every picture, the largest centered one by default, is cut out and resized, after turning it upright,
+    stretching pixels that are not square, and putting white behind what is transparent. What was done to which file is
+    written down in OUT/BEHAVIOR/manifest.json, and OUT/BEHAVIOR/contact_sheet.png shows the result.
 
     Args:
         videos: Files, and folders of them; a folder of pictures is one video.
         out: Directory of the demo sets, the one to give to `bootifol train --demos`.
         frames: Frames of each video: the agent steps of the task's training episode, plus 1.
         size: Height and width of the pictures, in pixels.
+        crop: LEFT TOP SIDE: the square to cut out, in pixels of the upright picture.
         fps: Pictures per second, which should be the environment's; by default every picture is kept.
         windows: all cuts a long file into one video after another; first takes the beginning of each file.
         behavior: What the videos show.
@@ -101,7 +103,7 @@ def import_(
     from bootifol.demos.video_files import video_paths
 
     files = video_paths(videos)
-    conversion = Conversion(frames=frames, size=size, frames_per_second=fps, windows=windows)
+    conversion = Conversion(frames=frames, size=size, crop=crop, frames_per_second=fps, windows=windows)
     demo_set = import_videos(files, out / behavior, conversion, behavior, camera=camera)
     manifest = demo_set.manifest
     short = sum(video.length < manifest.frames for video in manifest.videos)

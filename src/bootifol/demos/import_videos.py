@@ -24,7 +24,7 @@ from bootifol.demos.shards import (
 )
 from bootifol.demos.upright import TimedFrame
 from bootifol.demos.video_files import frame_rate, is_lerobot_dataset, stream_video
-from bootifol.envs.pictures import centered_square
+from bootifol.envs.pictures import centered_square, resize
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.progress import progress
@@ -32,6 +32,12 @@ from bootifol.types import Frame, Frames
 
 Source = Path | LeRobotEpisode
 """One recording: a file, a folder of pictures, or one episode of a LeRobot dataset."""
+
+Crop = tuple[int, int, int]
+"""A square of a picture: its left edge, its top edge and its side, in pixels."""
+
+LARGEST_SQUARE = "largest centered square"
+"""How a manifest names the crop that nobody chose."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,10 @@ class Conversion:
     """Frames of every video in the set, T + 1; make it the task's agent steps per episode plus 1."""
 
     size: int = 64
-    """Height and width of the pictures in pixels; the largest centered square is cut out and resized."""
+    """Height and width of the pictures in pixels, to which the square that is cut out is resized."""
+
+    crop: Crop | None = None
+    """The square to cut out of every upright picture; by default the largest centered one."""
 
     frames_per_second: float | None = None
     """Pictures per second to resample to (the picture showing at each instant); None keeps every picture."""
@@ -56,6 +65,11 @@ class Conversion:
             raise BootifolError(f"a video needs at least 2 frames, not {self.frames}")
         if self.size < 1:
             raise BootifolError(f"pictures need a size of at least 1 pixel, not {self.size}")
+        if self.crop is not None and (min(self.crop[:2]) < 0 or self.crop[2] < 1):
+            raise BootifolError(
+                "a crop is LEFT TOP SIDE in pixels, edges of at least 0 and a side of at least 1, not "
+                + " ".join(map(str, self.crop))
+            )
         if self.frames_per_second is not None and not self.frames_per_second > 0:
             raise BootifolError(f"frames per second must be positive, not {self.frames_per_second}")
 
@@ -99,7 +113,11 @@ def import_videos(
 
 
 def read_recordings(
-    path: Path, size: int, frames_per_second: float | None, camera: str | None = None
+    path: Path,
+    size: int,
+    frames_per_second: float | None,
+    camera: str | None = None,
+    crop: Crop | None = None,
 ) -> Iterator[tuple[str, Frames]]:
     """Videos as an import would show them, but each in one piece and nothing written.
 
@@ -108,6 +126,7 @@ def read_recordings(
         size: height and width of the result.
         frames_per_second: to resample to, where a file says how fast it plays; None keeps every picture.
         camera: of a LeRobot dataset.
+        crop: as of `Conversion`.
 
     Yields:
         A name, and uint8 `[n, size, size, 3]`.
@@ -118,7 +137,7 @@ def read_recordings(
     for source in _sources([path], camera if is_lerobot_dataset(path) else None):
         rate = frames_per_second if _rate(source) else None
         name = f"{path} episode {source.index}" if isinstance(source, LeRobotEpisode) else str(path)
-        for frames in convert(source, Conversion(sys.maxsize, size, rate)):
+        for frames in convert(source, Conversion(sys.maxsize, size, crop, rate)):
             yield name, frames
 
 
@@ -126,20 +145,33 @@ def convert(source: Source, conversion: Conversion) -> Iterator[Frames]:
     """The windows of one recording, uint8 `[n, size, size, 3]`; only the last may have `n` below `frames`.
 
     Raises:
-        BootifolError: it cannot be read to its end, or has no times to resample by.
+        BootifolError: it cannot be read to its end, has no times to resample by, or is smaller than its crop.
     """
     window: list[Frame] = []
     windows = 0
     for frame in _resampled(source, conversion.frames_per_second):
         if conversion.windows == "first" and windows:
             continue  # still read to the end, so that a truncated file is noticed
-        window.append(centered_square(frame, conversion.size))
+        window.append(_square(frame, conversion, source))
         if len(window) == conversion.frames:
             yield np.stack(window)
             windows += 1
             window = []
     if window and not windows:
         yield np.stack(window)
+
+
+def _square(frame: Frame, conversion: Conversion, source: Source) -> Frame:
+    if conversion.crop is None:
+        return centered_square(frame, conversion.size)
+    left, top, side = conversion.crop
+    height, width, _ = frame.shape
+    if left + side > width or top + side > height:
+        raise BootifolError(
+            f"{source}: a crop of {side}×{side} pixels at {left}, {top} reaches out of its pictures, which have "
+            f"{width}×{height} (width × height, upright)"
+        )
+    return resize(frame[top : top + side, left : left + side], conversion.size)
 
 
 def _sources(files: Sequence[Path], camera: str | None) -> list[Source]:
@@ -254,7 +286,8 @@ def _write_set(
             render_profile=None,
             action_repeat=None,
             frames_per_second=rates.pop() if len(rates) == 1 else None,
-            conversion=dataclasses.asdict(conversion) | {"crop": "largest centered square"},
+            conversion=dataclasses.asdict(conversion)
+            | {"crop": list(conversion.crop) if conversion.crop else LARGEST_SQUARE},
             versions=installed_versions(),
             shards=tuple(shards),
             videos=tuple(entries),

@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
-from bootifol.demos.import_videos import read_recordings
+from bootifol.demos.import_videos import LARGEST_SQUARE, read_recordings
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import draw_references
@@ -158,7 +158,7 @@ def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[st
     length = min((len(reference.frames) for reference in references), default=None)
     scores: dict[str, Rewards] = {}
     for path in map(Path, videos):
-        for video in _read_videos(path, run):
+        for video in read_videos(path, run):
             shortened = Video(video.name, video.frames[:length])
             scores[video.name] = model.label(shortened, references)
     return scores
@@ -194,15 +194,17 @@ def _learn_and_report(run: Run) -> bool:
     return True
 
 
-def _read_videos(path: Path, run: RunConfig) -> Iterator[Video]:
-    """The videos there, with the size and the pace of those that the run learned from."""
+def read_videos(path: Path, run: RunConfig) -> Iterator[Video]:
+    """The videos there, with the size, the crop and the pace of those that the run learned from."""
     if (path / MANIFEST_NAME).is_file():
         demo_set = DemoSet.open(path)
         yield from map(demo_set.__getitem__, range(len(demo_set)))
         return
     expert = read_manifest(find_demo_sets(run.demos)["expert"])
     size, camera = run.training.pictures.video_size, expert.videos[0].source.get("camera")
-    for name, frames in read_recordings(path, size, expert.frames_per_second, camera):
+    crop = (expert.conversion or {}).get("crop", LARGEST_SQUARE)
+    chosen = None if crop == LARGEST_SQUARE else tuple(crop)
+    for name, frames in read_recordings(path, size, expert.frames_per_second, camera, chosen):
         yield Video(name, frames)
 
 
