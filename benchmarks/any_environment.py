@@ -3,10 +3,10 @@
     python -m benchmarks.any_environment pendulum --out runs/pendulum --time-budget 40m
     python -m benchmarks.any_environment reacher --out runs/reacher_v5 --time-budget 40m
 
-Pendulum-v1 needs no MuJoCo and is named by its ID; Reacher-v5 does, and a function below makes it, with a camera of its
-own. Both need `pip install 'bootifol[gymnasium]'`. The experts below read the simulator's state. They are filmed by
-Gymnasium's renderer at its full size and speed, as any user would film theirs; from there on this script only types the
-commands that a user would type, and prints them. What is there already is not done again.
+Pendulum-v1 needs no MuJoCo, Reacher-v5 does; both need `pip install 'bootifol[gymnasium]'`. Functions below make them,
+so that their pictures show what they must and not what they should not. The experts below read the simulator's state.
+They are filmed by Gymnasium's renderer at its full size and speed, as any user would film theirs; from there on this
+script only types the commands that a user would type, and prints them. What is there already is not done again.
 """
 
 from __future__ import annotations
@@ -78,6 +78,18 @@ def reach(environment: Any) -> NDArray[np.float64]:
     return torque
 
 
+class _WithoutArrow(gymnasium.Wrapper[Any, Any, Any, Any]):
+    def render(self) -> Any:
+        environment: Any = self.unwrapped
+        environment.last_u = None  # what it draws the arrow for
+        return self.env.render()
+
+
+def pendulum_without_arrow() -> gymnasium.Env[Any, Any]:
+    """Pendulum-v1 without the arrow that shows its last torque: a video of the real thing would not show its actions."""
+    return _WithoutArrow(gymnasium.make("Pendulum-v1", render_mode="rgb_array"))
+
+
 def reacher_from_above() -> gymnasium.Env[Any, Any]:
     """Reacher-v5 with a camera that fills the picture with what matters: its own shows the target as one pixel of 64²,
     and none of what a torque does to the arm in one step.
@@ -93,7 +105,9 @@ def reacher_from_above() -> gymnasium.Env[Any, Any]:
 
 
 EXAMPLES = {
-    "pendulum": Example("gymnasium:Pendulum-v1", swing_up, action_repeat=2, episode_steps=60),
+    "pendulum": Example(
+        "benchmarks.any_environment:pendulum_without_arrow", swing_up, action_repeat=2, episode_steps=60
+    ),
     "reacher": Example(
         "benchmarks.any_environment:reacher_from_above", reach, action_repeat=2, episode_steps=40
     ),
