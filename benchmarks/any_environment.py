@@ -86,7 +86,7 @@ class _WithoutArrow(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 def pendulum_without_arrow() -> gymnasium.Env[Any, Any]:
-    """Pendulum-v1 without the arrow that shows its last torque: a video of the real thing would not show its actions."""
+    """Pendulum-v1 without the arrow of its last torque: a video of the real thing would not show its actions."""
     return _WithoutArrow(gymnasium.make("Pendulum-v1", render_mode="rgb_array"))
 
 
