@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from bootifol.cli.main import main
 from bootifol.demos.augmentation import AugmentedVideos
@@ -66,12 +67,14 @@ def test_score_rewards_video_files_and_demo_sets(
 ) -> None:
     frames = DemoSet.open(demos / "expert")[0].frames
     write_video(tmp_path / "mine.mp4", frames, 10.0)
-    table = tmp_path / "rewards.csv"
-    assert (
-        main(["score", str(run), str(tmp_path / "mine.mp4"), str(demos / "half_good"), "--out", str(table)])
-        == 0
-    )
-    assert "mean reward a step" in capsys.readouterr().out
+    table, picture = tmp_path / "rewards.csv", tmp_path / "rewards.png"
+    videos = [str(tmp_path / "mine.mp4"), str(demos / "half_good")]
+    assert main(["score", str(run), *videos, "--out", str(table), "--picture", str(picture)]) == 0
+    printed = capsys.readouterr().out
+    assert "mean reward a step" in printed
+    assert "of the first 6 videos" in " ".join(printed.split()) and Image.open(picture).format == "PNG"
+    assert main(["score", str(run), *videos, "--picture", str(tmp_path / "rewards.jpg")]) == 2
+    assert "choose a name that ends in .png" in capsys.readouterr().err
     rows = list(csv.DictReader(table.open()))
     mine = [float(row["reward"]) for row in rows if row["video"].endswith("mine.mp4")]
     assert len(mine) == 30 and np.isfinite(mine).all() and max(mine) <= 1

@@ -7,9 +7,15 @@ from PIL import Image
 
 from bootifol.errors import BootifolError
 from bootifol.reports import plots
-from bootifol.reports.film_strip import reward_above_film_strip, save_readme_picture, videos_of_start
+from bootifol.reports.film_strip import (
+    reward_above_film_strip,
+    rewards_above_film_strips,
+    save_readme_picture,
+    videos_of_start,
+)
 from bootifol.reports.run_files import Curve, RunFiles, read_run
-from bootifol.reports.style import KIND_COLORS, svg_data_uri, thousands
+from bootifol.reports.style import KIND_COLORS, RUN_COLORS, svg_data_uri, thousands
+from bootifol.types import Video
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +93,30 @@ def test_pictures_stand_at_their_time(run: RunFiles) -> None:
     shown = [np.array_equal(np.asarray(picture.get_array()), frame) for frame in videos["expert"].frames]
     assert shown[27]
     assert left <= 27 <= right
+
+
+def test_any_videos_stand_below_their_rewards() -> None:
+    """A shorter one ends where it ends."""
+    rng = np.random.default_rng(0)
+    videos = [
+        (
+            Video(f"clip {steps}", rng.integers(0, 256, (steps + 1, 8, 8, 3), np.uint8)),
+            rng.random(steps).astype(np.float32),
+        )
+        for steps in (40, 20)
+    ]
+    curves, first, second = rewards_above_film_strips(videos).axes
+    assert [line.get_color() for line in curves.lines] == list(RUN_COLORS[:2])
+    for line, (_, rewards) in zip(curves.lines, videos, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), rewards)
+    legend = curves.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == [
+        f"{number}  {video.name} (mean {rewards.mean():.3g})"
+        for number, (video, rewards) in enumerate(videos, start=1)
+    ]
+    assert (len(first.images), len(second.images)) == (10, 5)
+    np.testing.assert_array_equal(np.asarray(second.images[3].get_array()), videos[1][0].frames[14])
 
 
 def test_the_same_figure_gives_the_same_bytes(run: RunFiles) -> None:

@@ -14,17 +14,29 @@ def score(
     run: Annotated[Path, tyro.conf.Positional],
     videos: Annotated[list[Path], tyro.conf.Positional],
     out: Path | None = None,
+    picture: Path | None = None,
 ) -> int:
-    """Reward videos with a run's learned reward: one number each, and every step's in a CSV file.
+    """Reward videos with a run's learned reward: one number each, every step's in a CSV file or above film strips.
 
     Args:
         run: Directory that `bootifol train` wrote.
         videos: Video files (mp4, webm, gif …), folders of frames, .npy files, or demo sets.
         out: CSV file to write the reward of every step to: columns video, step, reward.
+        picture: PNG file to draw the reward of every step to, above the film strips of the first six videos.
     """
-    from bootifol.training.api import score_videos, write_scores
+    from bootifol.reports.film_strip import rewards_above_film_strips
+    from bootifol.reports.style import RUN_COLORS, require_png, save_png
+    from bootifol.training.api import scored_videos, write_scores
+    from bootifol.types import Rewards, Video
 
-    rewards = score_videos(run, videos)
+    if picture is not None:
+        require_png(picture)
+    rewards: dict[str, Rewards] = {}
+    shown: list[tuple[Video, Rewards]] = []
+    for video, of_video in scored_videos(run, videos):
+        rewards[video.name] = of_video
+        if picture is not None and len(shown) < len(RUN_COLORS):
+            shown.append((video, of_video))
     table = Table("video", "steps", "mean reward a step", "sum")
     for name, of_video in rewards.items():
         table.add_row(name, str(len(of_video)), f"{of_video.mean():.4f}", f"{of_video.sum():.2f}")
@@ -32,4 +44,8 @@ def score(
     if out is not None:
         write_scores(out, rewards)
         Console().print(f"every step's reward: {out}")
+    if picture is not None:
+        save_png(rewards_above_film_strips(shown), picture)
+        left_out = f" (of the first {len(shown)} videos)" if len(rewards) > len(shown) else ""
+        Console().print(f"rewards above film strips: {picture}{left_out}")
     return 0

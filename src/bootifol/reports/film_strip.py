@@ -16,7 +16,8 @@ from bootifol.files import written_aside
 from bootifol.reports.names import agent_name, task_title
 from bootifol.reports.plots import draw_return_curves, looks_of
 from bootifol.reports.run_files import RunFiles, ShowcaseVideo, read_run
-from bootifol.reports.style import FAINT, KIND_COLORS, KIND_NAMES, house_style
+from bootifol.reports.style import FAINT, KIND_COLORS, KIND_NAMES, RUN_COLORS, house_style
+from bootifol.types import Rewards, Video
 
 KINDS = ("expert", "agent", "random")
 """Whose pictures are shown, from top to bottom."""
@@ -45,6 +46,29 @@ def reward_above_film_strip(videos: Mapping[str, ShowcaseVideo]) -> Figure:
         layout = _Layout.of(videos, curve_height=1.9)
         figure = Figure(figsize=(WIDTH, layout.height))
         draw_reward_and_strips(figure, videos, layout)
+        return figure
+
+
+def rewards_above_film_strips(videos: Sequence[tuple[Video, Rewards]]) -> Figure:
+    """The rewards of any videos, and below them one film strip a video, numbered as in the legend.
+
+    Args:
+        videos: one to `len(RUN_COLORS)` of them, each with its rewards, which may end before it does.
+    """
+    shown = {
+        f"{number}": ShowcaseVideo("", 0, video.frames, rewards, None, None)
+        for number, (video, rewards) in enumerate(videos, start=1)
+    }
+    colors = dict(zip(shown, RUN_COLORS, strict=False))
+    with house_style():
+        layout = _Layout.of(shown, curve_height=1.9, top=0.3 + 0.2 * len(videos))
+        figure = Figure(figsize=(WIDTH, layout.height), dpi=150)
+        curves = draw_reward_and_strips(figure, shown, layout, colors)
+        labels = [
+            f"{number}  {video.name} (mean {rewards.mean():.3g})"
+            for number, (video, rewards) in zip(shown, videos, strict=True)
+        ]
+        curves.legend(curves.get_lines(), labels, loc="lower left", bbox_to_anchor=(-0.01, 1.0))
         return figure
 
 
@@ -82,7 +106,7 @@ def expert_above_agent(runs: Sequence[RunFiles], start: int = 0) -> Figure:
                 left, bottom, width, share = layout.box(row)
                 box = (left, (top + bottom * layout.height) / height, width, share * layout.height / height)
                 axes = figure.add_axes(box)
-                draw_strip(axes, kind, video, steps, moments)
+                draw_strip(axes, kind, video, steps, moments, KIND_COLORS[kind])
                 if row == 1:
                     axes.set_title(f"{task_title(run.task)}: {agent_name(run)}", loc="left", fontsize=9.5)
                     axes.set_xticks([])
@@ -126,17 +150,20 @@ class _Layout:
 
 
 def draw_reward_and_strips(
-    figure: Figure | SubFigure, videos: Mapping[str, ShowcaseVideo], layout: _Layout
+    figure: Figure | SubFigure,
+    videos: Mapping[str, ShowcaseVideo],
+    layout: _Layout,
+    colors: Mapping[str, str] = KIND_COLORS,
 ) -> Axes:
     """Draws reward curves and film strips over the whole figure, on one time axis; returns the axes above."""
     steps = max(len(video.rewards) for video in videos.values())
     curves = figure.add_axes(layout.box(0))
-    _draw_rewards(curves, videos, steps)
+    _draw_rewards(curves, videos, steps, colors)
     # Each picture shows the moment at the middle of the time it covers.
     moments = [int((number + 0.5) * steps / PICTURES) for number in range(PICTURES)]
     for row, (kind, video) in enumerate(videos.items(), start=1):
         strip = figure.add_axes(layout.box(row), sharex=curves)
-        draw_strip(strip, kind, video, steps, moments)
+        draw_strip(strip, kind, video, steps, moments, colors[kind])
         if row == len(videos):
             strip.set_xlabel("agent steps in the episode")
             strip.tick_params(axis="x", labelbottom=True, length=3)
@@ -172,13 +199,15 @@ def save_readme_picture(run_dir: Path, out_png: Path) -> None:
             figure.savefig(aside, format="png")
 
 
-def _draw_rewards(axes: Axes, videos: Mapping[str, ShowcaseVideo], steps: int) -> None:
+def _draw_rewards(
+    axes: Axes, videos: Mapping[str, ShowcaseVideo], steps: int, colors: Mapping[str, str]
+) -> None:
     for kind, video in videos.items():
         axes.plot(
             np.arange(1, len(video.rewards) + 1),
             video.rewards,
-            color=KIND_COLORS[kind],
-            label=KIND_NAMES[kind],
+            color=colors[kind],
+            label=KIND_NAMES.get(kind, kind),
             linestyle=(0, (1.5, 1.2)) if kind == "random" else "-",
         )
     axes.set_xlim(0, steps)
@@ -187,7 +216,9 @@ def _draw_rewards(axes: Axes, videos: Mapping[str, ShowcaseVideo], steps: int) -
     axes.legend(loc="best", ncols=len(videos))
 
 
-def draw_strip(axes: Axes, kind: str, video: ShowcaseVideo, steps: int, moments: Sequence[int]) -> None:
+def draw_strip(
+    axes: Axes, kind: str, video: ShowcaseVideo, steps: int, moments: Sequence[int], color: str
+) -> None:
     """Pictures side by side over an axis of agent steps, one a moment; those past the video's end stay empty."""
     width = steps / len(moments)
     for number, moment in enumerate(moments):
@@ -206,11 +237,11 @@ def draw_strip(axes: Axes, kind: str, video: ShowcaseVideo, steps: int, moments:
     axes.text(
         -0.008,
         0.5,
-        KIND_NAMES[kind],
+        KIND_NAMES.get(kind, kind),
         transform=axes.transAxes,
         ha="right",
         va="bottom",
-        color=KIND_COLORS[kind],
+        color=color,
         weight="bold",
     )
     axes.text(-0.008, 0.5, total, transform=axes.transAxes, ha="right", va="center", color=FAINT, fontsize=8)

@@ -90,13 +90,22 @@ def save_png(figure: Figure, out: Path) -> Path:
     Raises:
         BootifolError: the file's name does not end in .png, or it cannot be written.
     """
+    require_png(out)
+    with house_style(), written_aside(out) as aside:
+        figure.savefig(aside, format="png")
+    return out
+
+
+def require_png(out: Path) -> None:
+    """Refuses other names before any work is done.
+
+    Raises:
+        BootifolError: the file's name does not end in .png.
+    """
     if out.suffix != ".png":
         raise BootifolError(
             f"a figure is written as a PNG file, not as {out.name}; choose a name that ends in .png"
         )
-    with house_style(), written_aside(out) as aside:
-        figure.savefig(aside, format="png")
-    return out
 
 
 def legend_above(figure: Figure) -> None:

@@ -146,6 +146,11 @@ def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[st
     Returns:
         Rewards `[T]` by the video's name. A video longer than those it is compared with is scored as far as they reach.
     """
+    return {video.name: rewards for video, rewards in scored_videos(directory, videos)}
+
+
+def scored_videos(directory: Path | str, videos: Sequence[Path | str]) -> Iterator[tuple[Video, Rewards]]:
+    """The same one by one, with the pictures that were scored."""
     run = _run_with_demos(directory)
     model = build_reward_model(run)
     if model.reads_environment_reward:
@@ -156,12 +161,10 @@ def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[st
     expert = open_demos(run, Console(stderr=True)).expert
     references = draw_references(model, expert, reference_rng(run.seed, 0))
     length = min((len(reference.frames) for reference in references), default=None)
-    scores: dict[str, Rewards] = {}
     for path in map(Path, videos):
         for video in read_videos(path, run):
             shortened = Video(video.name, video.frames[:length])
-            scores[video.name] = model.label(shortened, references)
-    return scores
+            yield shortened, model.label(shortened, references)
 
 
 def write_scores(path: Path, scores: dict[str, Rewards]) -> None:
