@@ -94,8 +94,8 @@ def pendulum_without_arrow() -> gymnasium.Env[Any, Any]:
 
 
 STRONGEST = 0.2
-"""Of Reacher-v5's torques, of 1. With all of it random actions whirl the arm about, and what they teach of actions is far
-coarser than the expert's, which are below 0.3 in 19 steps of 20."""
+"""Of Reacher-v5's torques, of 1. With all of it random actions whirl the arm about, and what they teach is far coarser
+than the expert's actions, which are below 0.3 in 19 steps of 20."""
 
 
 def reacher_from_above() -> gymnasium.Env[Any, Any]:
