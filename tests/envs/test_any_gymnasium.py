@@ -248,3 +248,24 @@ def test_the_wrapper_that_a_refusal_names_helps(identifier: str, monkeypatch: py
 def test_registered_environments_are_left_as_they_were() -> None:
     simulator()
     assert gymnasium.spec("Tiny/Slide-v0").max_episode_steps == 7
+
+
+@pytest.mark.usefixtures("requires_rendering")
+@pytest.mark.skipif(find_spec("imageio") is None, reason="needs `pip install 'bootifol[gymnasium]'`")
+def test_the_example_of_the_documentation_is_a_task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "environments.md").read_text()
+    example = page.partition("```python\n# my_robot.py\n")[2].partition("```")[0]
+    (tmp_path / "my_robot_of_the_documentation.py").write_text(example)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    made = simulator("my_robot_of_the_documentation:make")
+    whole = simulator("gymnasium:Reacher-v5")
+    made.reset(seed=0)
+    whole.reset(seed=0)
+    made.step(np.float32([1.0, -0.5]))
+    whole.step(np.float32([0.2, -0.1]))
+    reached, same = (one.environment.unwrapped.data.qvel for one in (made, whole))
+    np.testing.assert_allclose(reached, same, rtol=1e-5)
+    assert not np.array_equal(made.render(), whole.render()), "seen from another place"
+    made.close()
+    whole.close()
