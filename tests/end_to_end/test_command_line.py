@@ -199,3 +199,12 @@ def test_every_command_explains_itself(command: list[str], capsys: pytest.Captur
         main([*command, "--help"])
     assert stopped.value.code == 0
     assert "usage: bootifol" in capsys.readouterr().out
+
+
+def test_help_breaks_lines_where_the_terminal_ends_and_not_where_a_docstring_does(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    with pytest.raises(SystemExit):
+        main(["experts", "train", "--help"])
+    assert "shorter ones show more starts, which is what rare rewards need" in capsys.readouterr().out

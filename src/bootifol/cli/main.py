@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 
@@ -23,6 +24,9 @@ A first tour:
 
 DEMOS_DESCRIPTION = "Make, import, check and export sets of videos to learn from."
 EXPERTS_DESCRIPTION = "Train who performs a task in recordings, where none is bundled."
+
+_CONTINUED_LINE = re.compile(r"\n {12,}(?=\S)")
+"""Where the description of an argument goes on in the next line of a docstring."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -55,6 +59,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(commands: dict[str, Callable[..., int]], words: list[str], prog: str, description: str) -> int:
+    for command in commands.values():
+        function = command.func if isinstance(command, functools.partial) else command
+        # tyro would keep the line breaks of a docstring in the help, which has another width.
+        function.__doc__ = _CONTINUED_LINE.sub(" ", function.__doc__ or "")
     code: int = tyro.extras.subcommand_cli_from_dict(
         commands,
         prog=prog,
