@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,9 @@ class Example:
     action_repeat: int
     episode_steps: int
     """Agent steps of a training episode."""
+    pushes: float = 0.0
+    """Chance, at each agent step, that a random action takes over for one to three of them. An expert that never errs
+    never shows how to recover, and its clone, which does err, is lost (DART: Laskey et al., 2017)."""
 
 
 def swing_up(environment: Any) -> NDArray[np.float64]:
@@ -117,12 +120,32 @@ def reacher_from_above() -> gymnasium.Env[Any, Any]:
 
 EXAMPLES = {
     "pendulum": Example(
-        "benchmarks.any_environment:pendulum_without_arrow", swing_up, action_repeat=2, episode_steps=60
+        "benchmarks.any_environment:pendulum_without_arrow",
+        swing_up,
+        action_repeat=2,
+        episode_steps=60,
+        pushes=0.15,
     ),
     "reacher": Example(
         "benchmarks.any_environment:reacher_from_above", reach, action_repeat=2, episode_steps=40
     ),
 }
+
+
+def pushed(
+    example: Example, environment: gymnasium.Env[Any, Any], rng: np.random.Generator
+) -> Iterator[NDArray[np.float64]]:
+    """The expert's actions, one a step of the environment, and random ones in their place where it is pushed."""
+    space = environment.action_space
+    assert isinstance(space, gymnasium.spaces.Box)
+    left = 0
+    push = np.zeros(space.shape)
+    while True:
+        if left == 0 and rng.random() < example.pushes:
+            left, push = int(rng.integers(1, 4)), rng.uniform(space.low, space.high)
+        for _ in range(example.action_repeat):
+            yield push if left else example.expert(environment.unwrapped)
+        left = max(left - 1, 0)
 
 
 def film(example: Example, directory: Path, episodes: int) -> float:
@@ -140,8 +163,9 @@ def film(example: Example, directory: Path, episodes: int) -> float:
             if not path.exists():
                 simulator.reset(seed=10_000 + number)
                 frames, total = [np.asarray(environment.render())], 0.0
+                actions = pushed(example, environment, np.random.default_rng(number))
                 for _ in range(example.action_repeat * example.episode_steps + 1):
-                    _, reward, *_ = environment.step(example.expert(environment.unwrapped).astype(np.float32))
+                    _, reward, *_ = environment.step(next(actions).astype(np.float32))
                     total += float(reward)
                     frames.append(np.asarray(environment.render()))
                 write_video(path, np.stack(frames), 1.0 / simulator.step_seconds)
