@@ -153,6 +153,7 @@ def test_ones_own_videos_are_enough(demos: Path, tmp_path: Path, monkeypatch: py
         ),
         (["evaluate", "nowhere"], "nowhere is not a run"),
         (["score", "nowhere", "video.mp4"], "nowhere is not a run"),
+        (["score", "nowhere"], "there are no videos to score"),
         (["report", "nowhere"], "nowhere"),
         (["demos", "check", "nowhere"], "nowhere"),
         (["demos", "record", "--task", "fly", "--out", "y"], "there is no task 'fly'"),

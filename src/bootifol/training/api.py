@@ -150,7 +150,13 @@ def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[st
 
 
 def scored_videos(directory: Path | str, videos: Sequence[Path | str]) -> Iterator[tuple[Video, Rewards]]:
-    """The same one by one, with the pictures that were scored."""
+    """The same one by one, with the pictures that were scored.
+
+    Raises:
+        BootifolError: there are no videos, one cannot be read, or the run has no reward for them.
+    """
+    if not videos:
+        raise BootifolError("there are no videos to score: name files, folders of pictures, or demo sets")
     run = _run_with_demos(directory)
     model = build_reward_model(run)
     if model.reads_environment_reward:
