@@ -36,7 +36,7 @@ FEW_GROUPS = 3
 
 LITTLE_MOTION = 0.007
 """Share of the picture that changes in a step below which a task is hard to see: 29 pixels of 64×64. The catalogue's
-experts change 66 or more; Reacher-v5 through its own camera 11, from which no action could be inferred."""
+experts change 72 or more; Reacher-v5 through its own camera 11, from which no action could be inferred."""
 
 
 @dataclass(frozen=True)
