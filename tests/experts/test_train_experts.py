@@ -71,6 +71,8 @@ def test_training_goes_on_where_it_stopped(tmp_path: Path, n_step: int) -> None:
     with (tmp_path / "run" / "curve.csv").open(newline="") as file:
         assert [row["agent_steps"] for row in csv.DictReader(file)] == ["30", "60"]
     assert (tmp_path / "run" / "expert.safetensors").exists()
+    with pytest.raises(BootifolError, match="holds 60 agent steps, more than the 30"):
+        train_expert(replace(CONFIG, agent_steps=30, n_step=n_step), tmp_path / "run")
     with pytest.raises(BootifolError, match=r"another expert \(different: seed\)"):
         train_expert(replace(CONFIG, seed=2, n_step=n_step), tmp_path / "run")
 

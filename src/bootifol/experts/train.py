@@ -310,7 +310,6 @@ def _save_checkpoint(directory: Path, model: Any) -> None:
         counts = {
             "num_timesteps": model.num_timesteps,
             "updates": model._n_updates,
-            "replay": int(buffer.pos),
         }
         write_json(aside / "counts.json", counts)
 
@@ -336,10 +335,17 @@ def _load_checkpoint(directory: Path, model: Any) -> None:
     with torch.no_grad():
         model.log_ent_coef.copy_(torch.from_numpy(arrays["log_ent_coef"]))
     buffer = model.replay_buffer
+    held = len(arrays["replay/rewards"])
+    if held > buffer.buffer_size:
+        raise BootifolError(
+            f"{directory} holds {held} agent steps, more than the {buffer.buffer_size} to train for: pass "
+            f"--agent-steps {held} or more"
+        )
     for name in ("observations", "next_observations", "actions", "rewards", "dones", "timeouts"):
         stored = arrays[f"replay/{name}"]
         getattr(buffer, name)[: len(stored)] = stored
-    buffer.pos, buffer.full = counts["replay"], len(arrays["replay/rewards"]) == buffer.buffer_size
+    # Not where it stood: a replay that was full may have more room now.
+    buffer.pos, buffer.full = held % buffer.buffer_size, held == buffer.buffer_size
     model.num_timesteps, model._n_updates = counts["num_timesteps"], counts["updates"]
 
 
