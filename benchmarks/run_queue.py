@@ -4,6 +4,8 @@
     OUT/TASK/METHOD[-VARIANT]/seedN.log       what it printed, in all attempts
     OUT/TASK/METHOD[-VARIANT]/seedN.failed    the sentence it failed with, if it did
 
+    KEEP/TASK/METHOD[-VARIANT]/seedN          what tables read of a run that is done, where there is to be such a copy
+
 There is no other record: what is done and what is left is read from these files.
 """
 
@@ -21,7 +23,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 
-from benchmarks.run_state import check_is_planned, error_file, log_file, run_state
+from benchmarks.run_state import (
+    RunState,
+    check_is_planned,
+    error_file,
+    keep,
+    log_file,
+    run_state,
+)
 from benchmarks.suites import RANDOM, VIDEOS, PlannedRun, demos_of
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.errors import BootifolError
@@ -73,6 +82,8 @@ class RunQueue:
         videos: expert videos to record where there are none; by default what the preset wants.
         program: the command that `train` and `demos record` are words to.
         say: prints a line.
+        kept: directory for copies of the results of runs that are done. A run with a copy there is done, wherever it
+            was trained.
 
     Raises:
         BootifolError: there are fewer cores than workers, or a run was begun otherwise than it is planned.
@@ -88,6 +99,7 @@ class RunQueue:
         videos: int | None = None,
         program: Sequence[str] = PROGRAM,
         say: Callable[[str], None] = print,
+        kept: Path | None = None,
     ) -> None:
         self.runs = runs
         self.out = out
@@ -96,20 +108,31 @@ class RunQueue:
         self.videos = videos
         self.program = program
         self.say = say
+        self.kept = kept
         self._cores = cores(workers)
         self._active: list[Active] = []
         self._stopping = False
         self._seconds = None if time_budget is None else parse_duration(time_budget)
         for run in runs:
-            check_is_planned(run, self.directory(run), self._seconds)
+            for directory in (self.directory(run), self.copy(run)):
+                if directory is not None:
+                    check_is_planned(run, directory, self._seconds)
 
     def directory(self, run: PlannedRun) -> Path:
         """Where a run is written."""
         return self.out / run.name
 
+    def copy(self, run: PlannedRun) -> Path | None:
+        """Where its results are kept, too."""
+        return None if self.kept is None else self.kept / run.name
+
+    def state(self, run: PlannedRun) -> RunState:
+        """How far a run is."""
+        return run_state(self.directory(run), self.copy(run))
+
     def outcome(self) -> Outcome:
         """The states of all runs."""
-        states = [run_state(self.directory(run)).state for run in self.runs]
+        states = [self.state(run).state for run in self.runs]
         done, failed = states.count("done"), states.count("failed")
         return Outcome(done, failed, len(states) - done - failed)
 
@@ -124,7 +147,9 @@ class RunQueue:
         """
         with self._alone() as lock, Interruption() as interruption:
             try:
-                waiting = [run for run in self.runs if run_state(self.directory(run)).state != "done"]
+                for run in self.runs:
+                    self._keep(run)
+                waiting = [run for run in self.runs if self.state(run).state != "done"]
                 waiting = self._with_demos(waiting, interruption, lock)
                 free = list(self._cores)
                 while waiting or self._active:
@@ -236,6 +261,7 @@ class RunQueue:
     def _conclude(self, ended: Active) -> None:
         directory = self.directory(ended.run)
         state = run_state(directory)
+        self._keep(ended.run)
         error = what_went_wrong(ended.process.returncode, log_file(directory), ended.log_begins)
         if state.state == "done":
             self.say(
@@ -246,6 +272,12 @@ class RunQueue:
         else:
             self._fail(ended.run, error, log_file(directory))
 
+    def _keep(self, run: PlannedRun) -> None:
+        """Copies the results of a run that is done in its own directory, if there are to be copies."""
+        copy = self.copy(run)
+        if copy is not None and run_state(self.directory(run)).state == "done":
+            keep(self.directory(run), copy)
+
     def _fail(self, run: PlannedRun, error: str, log: Path) -> None:
         directory = self.directory(run)
         with written_aside(error_file(directory)) as aside:
@@ -254,7 +286,7 @@ class RunQueue:
 
     def _time_left(self, waiting: Sequence[PlannedRun]) -> float | None:
         """Seconds until all runs have learned, if each takes as long as those that are done; None before the first."""
-        states = {run: run_state(self.directory(run)) for run in self.runs}
+        states = {run: self.state(run) for run in self.runs}
         done = {
             run: state.seconds for run, state in states.items() if state.state == "done" and state.seconds
         }

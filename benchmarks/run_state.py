@@ -1,21 +1,28 @@
-"""How far a run of a suite is, read from its directory: done, failed, begun, or not begun."""
+"""How far a run of a suite is, read from its directory: done, failed, begun, or not begun.
+
+What tables and figures read of a run that is done is small: such a copy, kept elsewhere, says as well that it is done.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from benchmarks.suites import RANDOM, PlannedRun
 from bootifol.errors import BootifolError
-from bootifol.files import read_json
+from bootifol.files import read_json, written_aside
 from bootifol.progress import duration
 from bootifol.reports.comparison import unfinished_because
 from bootifol.reports.run_files import read_run
 
 State = Literal["not begun", "begun", "done", "failed"]
+
+RESULT_FILES = ("config.json", "metrics.jsonl", "ranking.csv", "evaluations.csv")
+"""What tables and curves are made of."""
 
 _TAIL_BYTES = 64_000
 """Of metrics.jsonl: far more than its last lines."""
@@ -58,14 +65,20 @@ def error_file(directory: Path) -> Path:
     return directory.with_name(f"{directory.name}.failed")
 
 
-def run_state(directory: Path) -> RunState:
+def run_state(directory: Path, copy: Path | None = None) -> RunState:
     """The state of the run in a directory.
 
     Its report is the last thing a run writes; but `bootifol report` writes one of a run in progress, too.
+
+    Args:
+        directory: of the run.
+        copy: what `keep` has made of it, perhaps on another machine. If that is there, the run is done.
     """
+    if copy is not None and _is_finished(copy):
+        return RunState("done", *_progress(copy / "metrics.jsonl"))
     error = error_file(directory)
     state: State = "not begun"
-    if (directory / "report.html").is_file() and unfinished_because(read_run(directory)) is None:
+    if (directory / "report.html").is_file() and _is_finished(directory):
         state = "done"
     elif error.is_file():
         state = "failed"
@@ -74,6 +87,19 @@ def run_state(directory: Path) -> RunState:
     gradient_steps, agent_steps, seconds = _progress(directory / "metrics.jsonl")
     sentence = error.read_text().strip() if state == "failed" else ""
     return RunState(state, gradient_steps, agent_steps, seconds, sentence)
+
+
+def keep(directory: Path, copy: Path) -> None:
+    """Copies what tables and curves are made of, some hundred KB; no checkpoint, video or report."""
+    copy.mkdir(parents=True, exist_ok=True)
+    for name in RESULT_FILES:
+        if (directory / name).is_file():
+            with written_aside(copy / name) as aside:
+                shutil.copyfile(directory / name, aside)
+
+
+def _is_finished(directory: Path) -> bool:
+    return (directory / "config.json").is_file() and unfinished_because(read_run(directory)) is None
 
 
 def check_is_planned(run: PlannedRun, directory: Path, time_budget: float | None) -> None:

@@ -6,7 +6,8 @@
 
 Each run is a `bootifol train` on a core of its own, in OUT/TASK/METHOD[-VARIANT]/seedN. The same command goes on where
 it stopped: what is done is skipped, what was interrupted is resumed, what failed is tried again. Ctrl-C lets the runs
-write checkpoints. docs/suites.md tells more.
+write checkpoints. `--keep DIR` copies the results of what is done, small enough for a repository; another machine
+that has the copies goes on with the rest. docs/suites.md tells more.
 """
 
 from __future__ import annotations
@@ -60,6 +61,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--seeds", type=int, nargs="+", help="instead of the suite's")
     made.add_argument("--only", nargs="+", metavar="PATTERN", help="runs by name, such as '*/virl/*'")
     made.add_argument(
+        "--keep", type=Path, metavar="DIR", help="copies results of runs there; those that it has are done"
+    )
+    made.add_argument(
         "--list", action="store_true", help="print the runs and how far each is, and run nothing"
     )
     return made
@@ -74,7 +78,8 @@ def _work(arguments: argparse.Namespace, program: Sequence[str]) -> int:
     if arguments.list:
         width = max(len(run.name) for run in runs)
         for run in runs:
-            print(f"{run.name:{width}}  {run_state(out / run.name)}")
+            copy = arguments.keep and arguments.keep / run.name
+            print(f"{run.name:{width}}  {run_state(out / run.name, copy)}")
         return 0
     queue = RunQueue(
         runs,
@@ -85,6 +90,7 @@ def _work(arguments: argparse.Namespace, program: Sequence[str]) -> int:
         arguments.videos,
         program,
         say=lambda line: print(line, flush=True),
+        kept=arguments.keep,
     )
     outcome = queue.work()
     print(f"{outcome} of {len(runs)} runs in {out}")

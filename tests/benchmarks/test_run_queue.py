@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import fcntl
+import functools
 import itertools
 import json
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -166,6 +168,29 @@ def test_a_run_begun_otherwise_is_refused(suite: Path) -> None:
     without = System("bootifol", overrides=(("alignment.gradient_steps", 0),))
     with pytest.raises(BootifolError, match=r"with config\.alignment\.gradient_steps None, and .* has 0"):
         queue(suite, [PlannedRun("drawn_home", "smoke", without, 1)])
+
+
+def test_kept_results_stand_for_the_run_on_another_machine(suite: Path) -> None:
+    runs, kept = planned("bootifol", "gaifo"), suite / "kept"
+    keeping = functools.partial(
+        RunQueue, runs, demos=suite / "demos", program=FAKE, say=lambda _: None, kept=kept
+    )
+    assert str(keeping(out=suite / "out").work()) == "1 done, 1 failed, 0 left"
+    shutil.rmtree(kept)
+    assert str(keeping(out=suite / "out").work()) == "1 done, 1 failed, 0 left"
+    assert {path.relative_to(kept).as_posix() for path in kept.rglob("*.*")} == {
+        "drawn_home/bootifol/seed1/config.json",
+        "drawn_home/bootifol/seed1/evaluations.csv",
+        "drawn_home/bootifol/seed1/metrics.jsonl",
+    }
+    elsewhere = keeping(out=suite / "elsewhere")
+    assert str(elsewhere.state(runs[0])) == "done: 240 agent steps, 12 s"
+    assert str(elsewhere.work()) == "1 done, 1 failed, 0 left"
+    assert calls(suite).count("train bootifol/seed1") == 1
+    with pytest.raises(
+        BootifolError, match=r"kept/drawn_home/bootifol/seed1 was begun with time_budget None"
+    ):
+        keeping(out=suite / "a third", time_budget="60s")
 
 
 @pytest.mark.parametrize(
