@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import nn
+from torch.nn.modules.batchnorm import _BatchNorm
 
 from bootifol.devices import to_device
 from bootifol.rewards.gradient_step import GradientStep
@@ -31,6 +32,9 @@ class LearnedConfig(Protocol):
         """fp32, or bf16 to compute in bfloat16 where a method allows it."""
         ...
 
+
+NORMALIZATION_MOMENTUM = 0.1
+"""How far running normalization statistics move to those of a gradient step, PyTorch's default."""
 
 Config = TypeVar("Config", bound=LearnedConfig)
 Networks = TypeVar("Networks", bound=nn.Module)
@@ -66,6 +70,7 @@ class LearnedRewardModel(Generic[Config, Networks]):
             torch.manual_seed(seed)
             self.networks = make_networks(config, video_size)
         self.networks.to(self.device)
+        self._normalizations = [layer for layer in self.networks.modules() if isinstance(layer, _BatchNorm)]
         self._optimizer = torch.optim.Adam(self.networks.parameters(), lr=config.learning_rate, fused=True)
         self._rng = np.random.default_rng(seed)
 
@@ -101,7 +106,14 @@ class LearnedRewardModel(Generic[Config, Networks]):
         return to_device(torch.from_numpy(array), self.device)
 
     def _begin_step(self) -> GradientStep:
-        """The gradient step after those that `version` counts; to be made before the forward pass."""
+        """The gradient step after those that `version` counts; to be made before the forward pass.
+
+        Running statistics are the mean over the first ten steps, and only then an exponential one. From their initial
+        0 and 1 they would take dozens of steps to what the layers see; until then rewards would be of networks that
+        nobody trained, which matters to methods that learn only while the agent acts.
+        """
+        for layer in self._normalizations:
+            layer.momentum = max(NORMALIZATION_MOMENTUM, 1.0 / (self.version + 1))
         return GradientStep(self.networks, self._optimizer, self.version + 1)
 
     @contextmanager

@@ -35,6 +35,9 @@ from bootifol.types import (
     VideoSource,
 )
 
+SCALE_STEPS = 50
+"""Gradient steps after which the reward scale rests, if the Alignment Phase had fewer."""
+
 
 class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
     """A distance between videos, learned from expert videos and others.
@@ -77,8 +80,11 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
             yield self._step(expert, other, scaling=True)
 
     def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:
-        """Interactive Phase: the same gradient step, with the agent's own videos as the other class."""
-        return self._step(expert, agent, scaling=not self._scale.known)
+        """Interactive Phase: the same gradient step, with the agent's own videos as the other class.
+
+        The reward scale is that of the Alignment Phase; without one, of the first steps here.
+        """
+        return self._step(expert, agent, scaling=self.version < SCALE_STEPS)
 
     def label(self, video: Video, references: Sequence[Video]) -> Rewards:
         """`r_{t+1} = -||f(o_{0:t+1}) - f(o_{e,0:t+1})||` (Algorithm 1), or the cosine of the two.
