@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from rich.console import Console
 from benchmarks.command import command
 from benchmarks.page_modules import ADD_A_METHOD, write_page_modules
 from benchmarks.rows import Row, markdown, read_rows, write_rows
+from benchmarks.suites import RANDOM, System, every_system, with_overrides
 from bootifol.errors import BootifolError
 from bootifol.evaluation.returns import evaluate, scaled_return
 from bootifol.evaluation.summary import Summary, summarize
@@ -31,7 +32,6 @@ from bootifol.experts import make_random
 from bootifol.files import written_aside
 from bootifol.presets import preset
 from bootifol.reports.style import KIND_COLORS, RUN_COLORS, RUN_DASHES, house_style, save_png
-from bootifol.rewards.registry import RewardConfig
 from bootifol.tasks import Task, task_named
 from bootifol.training.components import build_environment
 from bootifol.training.config import TrainingConfig
@@ -42,36 +42,8 @@ from bootifol.training.train import Run
 PASSING = 0.6
 """Share of the expert's return that tests/end_to_end/test_learning.py asks for."""
 
-RANDOM = "random"
-
-Change = Callable[[RewardConfig], RewardConfig]
-
-
-def _bootifol(**fields: object) -> Change:
-    return lambda reward: replace(reward, bootifol=replace(reward.bootifol, **fields))  # type: ignore[arg-type]
-
-
-def _translation(references: int) -> Change:
-    return lambda reward: replace(
-        reward, context_translation=replace(reward.context_translation, references=references)
-    )
-
-
-def _unchanged(reward: RewardConfig) -> RewardConfig:
-    return reward
-
-
-METHODS: dict[str, tuple[str, Change]] = {
-    "bootifol-distance": ("bootifol", _bootifol(reward="distance")),
-    "bootifol-cosine": ("bootifol", _bootifol(reward="cosine", reward_scale="none")),
-    "virl": ("virl", _unchanged),
-    "context_translation-n10": ("context_translation", _translation(10)),
-    "context_translation-n1": ("context_translation", _translation(1)),
-    "gaifo": ("gaifo", _unchanged),
-    "optimal_transport": ("optimal_transport:OptimalTransport", _unchanged),
-    "environment": ("environment", _unchanged),
-}
-"""The `--method` of each, and what it changes of the preset's rewards; optimal_transport is docs/add_a_method.md's."""
+OPTIMAL_TRANSPORT = System("optimal_transport:OptimalTransport")
+"""The method that docs/add_a_method.md adds, at sizes of its own."""
 
 COLUMNS = ("method", "seed", "agent_steps", "seconds", "episodes", "mean_return", "scaled_return")
 
@@ -81,7 +53,9 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--methods", nargs="+", default=[*METHODS, RANDOM], choices=[*METHODS, RANDOM])
+    parser.add_argument(
+        "--methods", nargs="+", help="some of the systems of the suites, or optimal_transport"
+    )
     parser.add_argument("--own", nargs="+", default=[], help="more methods, as MODULE:NAME")
     parser.add_argument("--task", default="drawn_home")
     parser.add_argument("--preset", default="drawn")
@@ -99,12 +73,13 @@ def compare(arguments: argparse.Namespace) -> None:
     write_page_modules(ADD_A_METHOD, arguments.runs)
     sys.path.insert(0, str(arguments.runs.resolve()))
     config = _configuration(arguments.preset, arguments.agent_steps)
+    chosen = _chosen(arguments, config)
     console = Console()
     rows = read_rows(arguments.out, COLUMNS)
     done = {(row["method"], row["seed"]) for row in rows}
     for seed in arguments.seeds:
-        for method in [*arguments.methods, *arguments.own]:
-            described = described_run(arguments, config, method, seed)
+        for method, system in chosen.items():
+            described = described_run(arguments, config, system, seed)
             directory = arguments.runs / f"{method.replace(':', '.')}-seed{seed}"
             if (directory / "config.json").exists() and RunConfig.read(directory) != described:
                 raise BootifolError(f"{directory} holds another run: choose another --runs and another --out")
@@ -132,11 +107,31 @@ def _configuration(preset_name: str, agent_steps: int | None) -> TrainingConfig:
     return replace(config, evaluation=evaluation, threads=1, tensorboard=False)
 
 
-def described_run(arguments: argparse.Namespace, config: TrainingConfig, method: str, seed: int) -> RunConfig:
-    """What a method's run is."""
-    name, change = METHODS.get(method, (method, _unchanged))
-    config = replace(config, reward=change(config.reward))
-    return RunConfig(arguments.task, name, arguments.preset, seed, str(arguments.demos), None, config)
+def systems(config: TrainingConfig, task: str) -> dict[str, System]:
+    """All that can take part on a task, by name: what the suites compare, and the page's own method."""
+    compared = [system for system in every_system(config, timed=False) if system.is_compared_on(task)]
+    return {**{system.name: system for system in compared}, "optimal_transport": OPTIMAL_TRANSPORT}
+
+
+def _chosen(arguments: argparse.Namespace, config: TrainingConfig) -> dict[str, System]:
+    known = systems(config, arguments.task)
+    names = arguments.methods or list(known)
+    for name in names:
+        if name not in known:
+            raise BootifolError(
+                f"there is no system '{name}' on {arguments.task}: choose of {', '.join(known)}"
+            )
+    return {**{name: known[name] for name in names}, **{own: System(own) for own in arguments.own}}
+
+
+def described_run(
+    arguments: argparse.Namespace, config: TrainingConfig, system: System, seed: int
+) -> RunConfig:
+    """What a system's run is."""
+    config = with_overrides(config, system.overrides)
+    return RunConfig(
+        arguments.task, system.method, arguments.preset, seed, str(arguments.demos), None, config
+    )
 
 
 def trained_rows(described: RunConfig, method: str, directory: Path) -> list[Row]:

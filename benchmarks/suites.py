@@ -31,6 +31,9 @@ Overrides = tuple[tuple[str, Value], ...]
 RANDOM = "random"
 """The lower end of the scale: it learns nothing, so `benchmarks/random_policy.py` plays it instead of `train`."""
 
+CLONING_ALONE: Overrides = (("agent.cloning_weight", 1e6),)
+"""Beside so large a weight no reward is heard, so the agent is what the videos' inferred actions make of it."""
+
 
 @dataclass(frozen=True)
 class System:
@@ -114,20 +117,40 @@ def _replaced(config: Section, path: list[str], values: dict[str, Value]) -> Sec
 
 
 def every_system(config: TrainingConfig, timed: bool) -> list[System]:
-    """Every system of the paper's tables: its method, those it compares with, and both ends of the scale."""
+    """Every system of the paper's tables: its method, those it compares with, and both ends of the scale.
+
+    Videos, agent, budget and evaluation are the same for all. How many gradient steps its reward takes is a method's
+    own: in the paper ViRL takes twice BootIfOL's, and context translation, which learns nothing while the agent acts,
+    takes about three times BootIfOL's Alignment Phase in its release. They do so in small presets, too. Where the
+    policy starts as a clone of the videos, `cloning_alone` shows what any reward adds to that, and `environment`, which
+    is given no videos, explores as DrQ-v2 does.
+    """
     cosine = (("reward.bootifol.reward", "cosine"), ("reward.bootifol.reward_scale", "none"))
+    translation = (("alignment.gradient_steps", 3 * config.alignment.gradient_steps),)
     references = "reward.context_translation.references"
+    clones = config.demonstrations.share > 0
+    steps = config.interactive.agent_steps
+    explores = (("agent.exploration_start", 1.0), ("agent.exploration_steps", steps * 2 // 3))
     return [
         System("bootifol"),
         System("bootifol", "cosine", cosine),
         *(dataclasses.replace(system, tasks=tuple(META_WORLD.tasks)) for system in with_backbone(config)),
-        System("virl"),
+        System("virl", overrides=(("interactive.reward_update_every", virl_updates_every(config)),)),
         System("gaifo"),
-        System("context_translation", "n1", ((references, 1),)),
-        System("context_translation", "n10", ((references, 10),)),
-        System("environment"),
+        System("context_translation", "n1", ((references, 1), *translation)),
+        System("context_translation", "n10", ((references, 10), *translation)),
+        *([System("bootifol", "cloning_alone", CLONING_ALONE)] if clones else []),
+        System("environment", overrides=explores if clones else ()),
         System(RANDOM),
     ]
+
+
+def virl_updates_every(config: TrainingConfig) -> int:
+    """Agent steps between two gradient steps of ViRL, so that it takes twice BootIfOL's, as in the paper: there 50."""
+    interactive, warm_up = config.interactive, config.agent.warm_up_steps
+    acting = max(interactive.reward_updates_until - warm_up, 0) / interactive.reward_update_every
+    wanted = 2 * (config.alignment.gradient_steps + acting)
+    return max(round((interactive.agent_steps - warm_up) / max(wanted, 1.0)), 1)
 
 
 def with_backbone(config: TrainingConfig) -> list[System]:

@@ -50,6 +50,7 @@ CPU = TrainingConfig(
         ),
         context_translation=ContextTranslationConfig(
             width_divisor=4,
+            image_weight=0.14,
             pairs=8,
             frames_per_pair=8,
             precision="bf16",
@@ -120,7 +121,7 @@ DRAWN = replace(
     reward=RewardConfig(
         replace(CPU.reward.bootifol, width_divisor=8),
         virl=replace(CPU.reward.virl, width_divisor=8),
-        context_translation=replace(CPU.reward.context_translation, width_divisor=8),
+        context_translation=replace(CPU.reward.context_translation, width_divisor=8, image_weight=0.28),
         gaifo=replace(CPU.reward.gaifo, width_divisor=8),
     ),
     agent=replace(

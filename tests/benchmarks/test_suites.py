@@ -9,7 +9,16 @@ from pathlib import Path
 import pytest
 import tyro
 from benchmarks.suite import main
-from benchmarks.suites import SUITES, VIDEOS, PlannedRun, demos_of, equivalent_steps, with_overrides
+from benchmarks.suites import (
+    SUITES,
+    VIDEOS,
+    PlannedRun,
+    demos_of,
+    equivalent_steps,
+    every_system,
+    virl_updates_every,
+    with_overrides,
+)
 from fake_program import write_config, write_end
 
 from bootifol.errors import BootifolError
@@ -125,6 +134,19 @@ def test_encoder_training_lengths_are_the_papers_or_the_same_shares() -> None:
     # 24,000 of cpu's 30,000 steps follow its warm-up: 24,000 * (100,000 - 1920) / (1,550,000 - 1920) = 1521
     assert [equivalent_steps(CPU, length, timed=False) for length in lengths] == [0, 7521, 11_784, 30_000]
     assert equivalent_steps(CPU, 375_000, timed=True) == round(30_000 * 375 / 1550)
+
+
+def test_virl_takes_twice_as_many_gradient_steps_as_bootifol_whatever_the_preset() -> None:
+    assert virl_updates_every(PAPER) == 50  # N_update, with which the paper says so
+    # cpu: 500 in the Alignment Phase and 9000 / 50 after it, twice that in 24,000 agent steps
+    assert virl_updates_every(CPU) == round(24_000 / (2 * 680)) == 18
+
+
+def test_a_preset_that_clones_shows_what_cloning_alone_brings() -> None:
+    names = {name: [system.name for system in every_system(preset(name), False)] for name in ("cpu", "drawn")}
+    assert set(names["cpu"]) - set(names["drawn"]) == {"bootifol-cloning_alone"}
+    environment = next(system for system in every_system(CPU, False) if system.method == "environment")
+    assert with_overrides(CPU, environment.overrides).agent.exploration(10_000) > 0.5
 
 
 def test_overrides_of_one_section_are_set_together() -> None:
