@@ -80,6 +80,7 @@ CPU = TrainingConfig(
         agent_steps=30_000,
         reward_updates_until=15_000,
         agent_videos=500,
+        relabel_episodes=4,
     ),
     demonstrations=DemonstrationConfig(
         share=0.25, videos=3000, inverse_dynamics_updates=2000, cloning_updates=5000
@@ -144,7 +145,7 @@ DRAWN = replace(
     demonstrations=DemonstrationConfig(),
     alignment=AlignmentConfig(gradient_steps=150, time_share=0.25, log_every=10),
     interactive=InteractiveConfig(
-        agent_steps=4500, reward_updates_until=2250, agent_videos=150, log_every=250
+        agent_steps=4500, reward_updates_until=2250, agent_videos=150, relabel_episodes=4, log_every=250
     ),
     evaluation=EvaluationConfig(
         every=750, episodes=5, long_episodes=5, final_episodes=50, held_out_videos=16
