@@ -90,9 +90,9 @@ CPU = TrainingConfig(
 """The same algorithm with smaller networks, pictures and counts: an hour to an hour and a half on one core, and 8 GB.
 
 Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
-`motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `saturation_weight`, `averaging` and
-`cloning_weight` of the agent, `demonstrations`, by which the policy starts as a clone of the videos, and
-`augmentation` where these come from files; each is described at its field.
+`motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `relabel_episodes`, by which stored
+rewards follow it, `saturation_weight`, `averaging` and `cloning_weight` of the agent, `demonstrations`, by which the
+policy starts as a clone of the videos, and `augmentation` where these come from files; each is described at its field.
 """
 
 BACKBONE = TrainingConfig(

@@ -1,3 +1,4 @@
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from benchmarks import (
     figure_demonstrations,
     figure_encoder_training,
     figure_encoding_based,
+    figure_metrics,
     figure_returns,
     figure_sequence_loss,
     table_dm_control,
@@ -216,3 +218,19 @@ def test_the_papers_tables_are_commands(tmp_path: Path, capsys: pytest.CaptureFi
     assert "Drawn Home" not in printed
     assert table_meta_world.main([str(tmp_path)]) == 2
     assert "none of the runs is on button_press, plate_slide, drawer_close" in capsys.readouterr().err
+
+
+def test_any_metric_has_a_panel_and_every_run_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_run(tmp_path / "a", seed=1, curve=CURVE, losses={"total": [3.0, 2.0]})
+    write_run(tmp_path / "b", seed=2, curve=CURVE, losses={"total": [5.0, 1.0], "extra": [1.0]})
+    runs = [read_run(tmp_path / name) for name in "ab"]
+    figure, notes = figure_metrics.draw(runs, argparse.Namespace(metrics=["loss/total", "loss/extra"]))
+    assert notes == [f"{tmp_path / 'a'} has not logged loss/extra"]
+    _, total, extra = figure.axes
+    assert [points(total, line)[:, 1].tolist() for line in range(2)] == [[3.0, 2.0], [5.0, 1.0]]
+    assert len(extra.lines) == 1
+    words = [str(tmp_path), "--metrics", "loss/none", "--out", str(tmp_path / "x.png")]
+    assert figure_metrics.main(words) == 2
+    assert "no run has logged loss/none; choose of" in capsys.readouterr().err

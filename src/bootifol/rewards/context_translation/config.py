@@ -17,8 +17,8 @@ class ContextTranslationConfig:
     with 10 and with 1."""
 
     image_weight: float = 1.0
-    """w_rec: weight of the squared distance of pictures in the reward; 0 leaves it out. 1 in the release, whose pictures
-    are 48x48. Both distances are sums, so (48 / size)^2 / width_divisor gives either its part at other sizes."""
+    """w_rec: weight of the squared distance of pictures in the reward; 0 leaves it out. 1 in the release, whose
+    pictures are 48x48. Both distances are sums: (48 / size)^2 / width_divisor gives either its part at other sizes."""
 
     reward_unit: Literal["none", "expert"] = "none"
     """none (the paper), or expert: rewards are divided by the cost that an expert frame itself has against one
