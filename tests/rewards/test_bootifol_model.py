@@ -126,6 +126,18 @@ def test_alignment_scale_gives_random_episodes_about_zero_a_step() -> None:
     np.testing.assert_array_equal(model.state()["reward_scale"], scale)
 
 
+def test_a_scale_without_alignment_comes_from_the_first_gradient_steps() -> None:
+    model = aligned(0, replace(SMALL, reward_scale="alignment"))
+    model.update(EXPERT, OTHER)
+    first = model.state()["reward_scale"].copy()
+    for _ in range(49):
+        model.update(EXPERT, OTHER)
+    settled = model.state()["reward_scale"].copy()
+    assert not np.allclose(first[1:], settled[1:])
+    model.update(EXPERT, OTHER)
+    np.testing.assert_array_equal(model.state()["reward_scale"], settled)
+
+
 def test_spoiled_share_of_the_others_is_drawn_from_the_expert() -> None:
     drawn: list[int] = []
 

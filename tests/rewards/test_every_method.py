@@ -69,6 +69,21 @@ def test_steps_log_what_they_made_smaller(method: str) -> None:
     assert 0 < metrics["loss/total"] < sum(terms) + 1e-4  # no weight is above 1
 
 
+def test_running_statistics_begin_at_those_of_the_first_gradient_step(method: str) -> None:
+    model = make(method)
+    assert isinstance(model, LearnedRewardModel)
+    means = [buffer for name, buffer in model.networks.named_buffers() if name.endswith("running_mean")]
+    if not means:
+        assert method == "context_translation"  # which normalizes nothing
+        return
+    for mean in means:
+        mean.fill_(1e6)
+    learn(model, 1)
+    assert all(mean.abs().max() < 100 for mean in means)
+    learn(model, 20)
+    assert {layer.momentum for layer in model.networks.modules() if hasattr(layer, "momentum")} == {0.1}
+
+
 @pytest.mark.parametrize("precision", ["fp32", "bf16"])
 def test_resumed_training_is_bit_for_bit_the_uninterrupted_one(method: str, precision: str) -> None:
     straight, stopped, resumed = (make(method, seed, precision=precision) for seed in (0, 0, 99))
