@@ -282,15 +282,19 @@ def test_target_critic_follows_slowly() -> None:
 def test_the_averaged_policy_follows_slowly_and_acts_without_exploration() -> None:
     agent = make_agent(dataclasses.replace(SMALL, averaging=0.75))
     newest = make_agent(SMALL)
-    before = agent.state()
-    agent.update(make_batch(), 0)
-    newest.update(make_batch(), 0)
-    after = agent.state()
-    averaged = [name for name in before if name.startswith("averaged_") and "/" not in name]
-    assert len(averaged) == sum(name.startswith(("encoder.", "actor.")) for name in before)
+    states = [agent.state()]
+    for _ in range(6):
+        agent.update(make_batch(), 0)
+        newest.update(make_batch(), 0)
+        states.append(agent.state())
+    averaged = [name for name in states[0] if name.startswith("averaged_") and "/" not in name]
+    assert len(averaged) == sum(name.startswith(("encoder.", "actor.")) for name in states[0])
     for name in averaged:
-        moved = after[name.removeprefix("averaged_")]
-        np.testing.assert_allclose(after[name], 0.75 * before[name] + 0.25 * moved, rtol=1e-5, atol=1e-7)
+        moved = [state[name.removeprefix("averaged_")] for state in states]
+        # Means of what the updates made, without the initial parameters, until 0.25 is more than 1 / (updates).
+        np.testing.assert_allclose(states[3][name], np.mean(moved[1:4], axis=0), rtol=1e-4, atol=1e-6)
+        expected = 0.75 * states[5][name] + 0.25 * moved[6]
+        np.testing.assert_allclose(states[6][name], expected, rtol=1e-5, atol=1e-7)
     observation = make_batch(9).observation[0].permute(1, 2, 0).contiguous().numpy()
     same, other = (
         [one.act(observation, 10**9, explore=explore) for one in (agent, newest)] for explore in (True, False)

@@ -85,7 +85,8 @@ class DrQv2Config:
 
     averaging: float = 0.0
     """Beyond DrQ-v2: without exploration the policy acts with running averages of encoder and actor, which keep this
-    share of themselves at each update and so even out the noise of the last ones; 0, as in its paper, the newest."""
+    share of themselves at each update and so even out the noise of the last ones; 0, as in its paper, the newest.
+    Until 1 / (1 - averaging) updates they are plain means, in which nothing is left of the initial parameters."""
 
     precision: Precision = "bf16"
     """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""

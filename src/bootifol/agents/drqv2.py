@@ -116,6 +116,7 @@ class DrQv2:
         _to_channels_last(self.encoder)
         self.target_critic.load_state_dict(self.critic.state_dict())
         self.target_critic.requires_grad_(False)
+        self._averages = 0
         self._averaged: tuple[Encoder | EncodingEncoder, Actor] | None = None
         if config.averaging > 0:
             self._averaged = copy.deepcopy(self.encoder), copy.deepcopy(self.actor)
@@ -256,11 +257,12 @@ class DrQv2:
     def _average(self) -> None:
         if self._averaged is None:
             return
+        self._averages += 1
+        # The mean at first, so that nothing is left of the initial parameters.
+        weight = max(1.0 - self.config.averaging, 1.0 / self._averages)
         with torch.no_grad():
             for average, newest in zip(self._averaged, (self.encoder, self.actor), strict=True):
-                torch._foreach_lerp_(
-                    list(average.parameters()), list(newest.parameters()), 1.0 - self.config.averaging
-                )
+                torch._foreach_lerp_(list(average.parameters()), list(newest.parameters()), weight)
 
     def state(self) -> Arrays:
         """Copies of all parameters, of the optimizers and of the noise generator."""
@@ -269,6 +271,7 @@ class DrQv2:
             for key, value in state.items():
                 arrays[f"{prefix}{key}/{name}"] = _copied(value)
         arrays["generator"] = _copied(self._generator.get_state())
+        arrays["averages"] = np.array([self._averages], np.int64)
         return arrays
 
     def load_state(self, arrays: Arrays) -> None:
@@ -292,6 +295,8 @@ class DrQv2:
                     value = torch.from_numpy(arrays[f"{prefix}{key}/{name}"].copy()).to(self._device)
                     state[key] = value.to(memory_format=torch.channels_last) if value.dim() == 4 else value
         self._generator.set_state(torch.from_numpy(arrays["generator"].copy()))
+        # Checkpoints of before it was counted go on as they did.
+        self._averages = int(arrays["averages"][0]) if "averages" in arrays else np.iinfo(np.int64).max
 
     def _parameters(self) -> dict[str, Tensor]:
         networks: dict[str, nn.Module] = {

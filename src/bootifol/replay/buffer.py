@@ -145,6 +145,10 @@ class ReplayBuffer:
         self._index()
         return self._next_id - 1
 
+    def agent_steps_of(self, episode_id: int) -> int:
+        """T of an episode that is whole in the buffer, one of `episode_ids`."""
+        return self._episodes[episode_id - self.episode_ids.start].agent_steps
+
     def relabel(self, episode_id: int, rewards: Rewards, actions: NDArray[np.float32] | None = None) -> bool:
         """Replaces the rewards `[T]` of an episode, and its actions `[T, A]` where there are new ones.
 

@@ -145,7 +145,9 @@ class InteractivePhase:
         episode_id = int(self.rng.integers(kept.start, kept.stop))
         video = self.agent_videos[episode_id % self.config.agent_videos]
         references = draw_references(self.reward_model, self.expert, self.rng)
-        self.replay.relabel(episode_id, self.reward_model.label(video, references))
+        # An episode that ended early stands still in the ring up to the full length; no reward looks ahead at that.
+        rewards = self.reward_model.label(video, references)[: self.replay.agent_steps_of(episode_id)]
+        self.replay.relabel(episode_id, rewards)
 
 
 def episode_seed(run_seed: int, episode: int) -> int:
