@@ -271,7 +271,8 @@ class DrQv2:
             for key, value in state.items():
                 arrays[f"{prefix}{key}/{name}"] = _copied(value)
         arrays["generator"] = _copied(self._generator.get_state())
-        arrays["averages"] = np.array([self._averages], np.int64)
+        if self._averaged is not None:
+            arrays["averages"] = np.array([self._averages], np.int64)
         return arrays
 
     def load_state(self, arrays: Arrays) -> None:
