@@ -22,7 +22,7 @@ setup: .venv/complete
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	touch .venv/complete
 
-# Expert videos in, a reward, a policy and a report out: about 13 minutes on 2 cores.
+# Expert videos in, a reward, a policy and a report out: about 15 minutes on 2 cores.
 demo: .venv/ready
 	$(BIN)/bootifol demos record --task reacher_hard --episodes 700 --out $(DEMO)/videos --workers 2
 	@if [ -f $(DEMO)/run/config.json ]; then \

@@ -159,7 +159,9 @@ SMOKE = replace(
     reward=RewardConfig(
         replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4),
         virl=replace(CPU.reward.virl, width_divisor=16, videos_per_class=4),
-        context_translation=replace(CPU.reward.context_translation, width_divisor=16, pairs=4),
+        context_translation=replace(
+            CPU.reward.context_translation, width_divisor=16, pairs=4, image_weight=0.035
+        ),
         gaifo=replace(CPU.reward.gaifo, width_divisor=16, videos_per_class=4),
     ),
     agent=replace(
@@ -171,7 +173,9 @@ SMOKE = replace(
         replay_capacity=3000,
     ),
     alignment=AlignmentConfig(gradient_steps=60, log_every=5),
-    interactive=InteractiveConfig(agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150),
+    interactive=replace(
+        CPU.interactive, agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150
+    ),
     demonstrations=replace(
         CPU.demonstrations, videos=20, inverse_dynamics_updates=30, cloning_updates=30, phases=1
     ),
