@@ -63,8 +63,8 @@ class Budget:
 
     Without a time limit, schedules follow agent steps and a run is reproducible bit for bit. With one, they are
     stretched over the time there is for acting: a quarter of the way into it, the noise stands where it would stand
-    a quarter of the way into `agent_steps`. Alignment and Cloning Phases take their share of the time first, and move
-    no schedule.
+    a quarter of the way into `agent_steps`. What Alignment and Cloning Phases take is not there for acting, so that the
+    end of a Cloning Phase finds schedules a little further on.
     """
 
     agent_steps: int

@@ -31,7 +31,7 @@ class BootifolConfig:
     or a mean that weighs reference i by softmax(reward_i / soft_min_temperature)."""
 
     soft_min_temperature: float = 0.1
-    """How soft soft_min is, in units of the reward: 0 tends to min, infinity to mean."""
+    """How soft soft_min is, in units of the distance, before `reward_scale`: 0 tends to min, infinity to mean."""
 
     reward_scale: Literal["none", "alignment"] = "none"
     """none (the paper), or alignment: 1 - distance / c_t, where c_t is the mean distance at time step t between
