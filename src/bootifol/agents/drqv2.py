@@ -296,8 +296,9 @@ class DrQv2:
                     value = torch.from_numpy(arrays[f"{prefix}{key}/{name}"].copy()).to(self._device)
                     state[key] = value.to(memory_format=torch.channels_last) if value.dim() == 4 else value
         self._generator.set_state(torch.from_numpy(arrays["generator"].copy()))
-        # Checkpoints of before it was counted go on as they did.
-        self._averages = int(arrays["averages"][0]) if "averages" in arrays else np.iinfo(np.int64).max
+        if self._averaged is not None:
+            # A checkpoint of before they were counted goes on as it did.
+            self._averages = int(arrays["averages"][0]) if "averages" in arrays else 10**9
 
     def _parameters(self) -> dict[str, Tensor]:
         networks: dict[str, nn.Module] = {
