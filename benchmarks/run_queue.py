@@ -23,14 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 
-from benchmarks.run_state import (
-    RunState,
-    check_is_planned,
-    error_file,
-    keep,
-    log_file,
-    run_state,
-)
+from benchmarks.run_state import RunState, check_is_planned, error_file, keep, log_file, run_state
 from benchmarks.suites import RANDOM, VIDEOS, PlannedRun, demos_of
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.errors import BootifolError
