@@ -5,18 +5,19 @@ What tables and figures read of a run that is done is small: such a copy, kept e
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from benchmarks.suites import RANDOM, PlannedRun
 from bootifol.errors import BootifolError
 from bootifol.files import read_json, written_aside
 from bootifol.progress import duration
-from bootifol.reports.comparison import unfinished_because
+from bootifol.reports.comparison import decisive, unfinished_because
 from bootifol.reports.run_files import read_run
 
 State = Literal["not begun", "begun", "done", "failed"]
@@ -116,22 +117,23 @@ def check_is_planned(run: PlannedRun, directory: Path, time_budget: float | None
     if not (directory / "config.json").is_file():
         return
     there = read_json(directory / "config.json", "the run's configuration")
-    wanted: dict[str, Any] = {
-        "task": run.task,
-        "method": run.system.method,
-        "preset": run.preset,
-        "seed": run.seed,
-        "time_budget": time_budget,
-        **{f"config.{field}": value for field, value in run.system.overrides},
-    }
-    for place, value in wanted.items():
-        found: Any = there
-        for key in place.split("."):
-            found = found.get(key) if isinstance(found, dict) else None
-        if found != value and not (place == "time_budget" and run.system.method == RANDOM):
+    wanted = {"task": run.task, "method": run.system.method, "preset": run.preset, "seed": run.seed}
+    found = {name: there.get(name) for name in wanted}
+    if run.system.method != RANDOM:  # which learns nothing, and has no budget
+        # What JSON makes of it, as it was written there.
+        planned = json.loads(json.dumps(dataclasses.asdict(run.config)))
+        written = decisive(there.get("config", {}), run.system.method)
+        # A field that is newer than the run is none that it can differ in.
+        fields = {
+            name: value for name, value in decisive(planned, run.system.method).items() if name in written
+        }
+        wanted |= {"time_budget": time_budget, **fields}
+        found |= {"time_budget": there.get("time_budget"), **written}
+    for name, value in wanted.items():
+        if found[name] != value:
             raise BootifolError(
-                f"{directory} was begun with {place} {found}, and this suite has {value}: choose another --out, or "
-                "the options it was begun with"
+                f"{directory} was begun with {name} {found[name]}, and this suite has {value}: choose another --out, "
+                "or the options it was begun with; if the suite has changed since, remove it, and it is run again"
             )
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from bootifol.errors import BootifolError
 from bootifol.presets import BACKBONE, PAPER, preset
+from bootifol.reports.names import CLONING_ALONE
 from bootifol.reports.paper_results import META_WORLD, RETURNS
 from bootifol.tasks import short_name, task_named
 from bootifol.training.config import TrainingConfig
@@ -31,8 +32,8 @@ Overrides = tuple[tuple[str, Value], ...]
 RANDOM = "random"
 """The lower end of the scale: it learns nothing, so `benchmarks/random_policy.py` plays it instead of `train`."""
 
-CLONING_ALONE: Overrides = (("agent.cloning_weight", 1e6),)
-"""Beside so large a weight no reward is heard, so the agent is what the videos' inferred actions make of it."""
+UNHEARD: Overrides = (("agent.cloning_weight", CLONING_ALONE),)
+"""No reward is heard, so the agent is what the videos' inferred actions make of it."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ def every_system(config: TrainingConfig, timed: bool) -> list[System]:
         System("gaifo"),
         System("context_translation", "n1", ((references, 1), *translation)),
         System("context_translation", "n10", ((references, 10), *translation)),
-        *([System("bootifol", "cloning_alone", CLONING_ALONE)] if clones else []),
+        *([System("bootifol", "cloning_alone", UNHEARD)] if clones else []),
         System("environment", overrides=explores if clones else ()),
         System(RANDOM),
     ]

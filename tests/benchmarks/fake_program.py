@@ -49,7 +49,11 @@ def main(words: list[str]) -> int:
 
 
 def write_config(out: Path, header: dict[str, object]) -> None:
-    config = {"interactive": {"agent_steps": 240}, "evaluation": {"final_episodes": 1}}
+    config = {
+        "alignment": {"gradient_steps": 60},
+        "interactive": {"agent_steps": 240},
+        "evaluation": {"final_episodes": 1},
+    }
     (out / "config.json").write_text(json.dumps(header | {"time_budget": None, "config": config}))
 
 

@@ -14,13 +14,20 @@ from pathlib import Path
 import pytest
 from benchmarks.run_queue import RunQueue, cores, missing_demos, record_words, what_went_wrong
 from benchmarks.run_state import run_state
-from benchmarks.suites import PlannedRun, System, backbone_comparison
+from benchmarks.suites import Overrides, PlannedRun, System, backbone_comparison
 from fake_program import write_config, write_end
 
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.presets import BACKBONE, CPU, SMOKE
+
+AS_FAKED: Overrides = (
+    ("interactive.agent_steps", 240),
+    ("agent.warm_up_steps", 60),
+    ("evaluation.final_episodes", 1),
+)
+"""What `fake_program.py` writes of a run's configuration."""
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_program.py")))
 
@@ -41,7 +48,7 @@ def suite(tmp_path: Path, demo_set: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
 
 
 def planned(*methods: str, task: str = "drawn_home", seed: int = 1) -> list[PlannedRun]:
-    return [PlannedRun(task, "smoke", System(method), seed) for method in methods]
+    return [PlannedRun(task, "smoke", System(method, overrides=AS_FAKED), seed) for method in methods]
 
 
 def queue(suite: Path, runs: list[PlannedRun], workers: int = 1, lines: list[str] | None = None) -> RunQueue:
@@ -165,8 +172,8 @@ def test_a_run_begun_otherwise_is_refused(suite: Path) -> None:
     queue(suite, planned("bootifol")).work()
     with pytest.raises(BootifolError, match=r"begun with time_budget None, and this suite has 60\.0"):
         RunQueue(planned("bootifol"), suite / "out", suite / "demos", time_budget="60s", program=FAKE)
-    without = System("bootifol", overrides=(("alignment.gradient_steps", 0),))
-    with pytest.raises(BootifolError, match=r"with config\.alignment\.gradient_steps None, and .* has 0"):
+    without = System("bootifol", overrides=(*AS_FAKED, ("alignment.gradient_steps", 0)))
+    with pytest.raises(BootifolError, match=r"begun with alignment\.gradient_steps 60, and this suite has 0"):
         queue(suite, [PlannedRun("drawn_home", "smoke", without, 1)])
 
 

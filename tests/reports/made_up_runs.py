@@ -28,6 +28,7 @@ def write_run(
     levels: Mapping[str, float] | None = LEVELS,
     losses: Mapping[str, Sequence[float]] | None = None,
     versions: Mapping[str, str] | None = None,
+    videos: Mapping[str, Mapping[str, Any]] | None = None,
     **changes: Any,
 ) -> Path:
     """A run that ended after `agent_steps` with these returns of 500-step episodes.
@@ -45,7 +46,8 @@ def write_run(
         final_episodes: as in config.json; by default as many as there are.
         levels: of the scale.
         losses: values by name, logged in both phases at steps 10, 20, ...
-        versions: as in config.json.
+        versions: as in config.json, where they differ from a usual run's.
+        videos: as in config.json.
         changes: fields of the configuration by dotted name, with __ for the dot.
     """
     config: dict[str, Any] = {
@@ -72,7 +74,8 @@ def write_run(
         "time_budget": time_budget,
         "command": ["bootifol", "train"],
         "config": config,
-        "versions": versions or {"bootifol": "0.1.0", "torch": "2.13.0"},
+        "versions": {"bootifol": "0.1.0", "torch": "2.13.0", "code": "abc123"} | (versions or {}),
+        "videos": videos or {},
     }
     run_dir.mkdir(parents=True)
     (run_dir / "config.json").write_text(json.dumps(header))

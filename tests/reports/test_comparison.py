@@ -80,19 +80,83 @@ def test_runs_of_mixed_configurations_are_kept_apart_and_named(tmp_path: Path) -
     write_run(tmp_path / "a", seed=1)
     write_run(tmp_path / "b", seed=2, agent__batch_size=64)
     comparison = comparison_of(tmp_path)
-    assert [group.name for group in comparison.groups] == ["BootIfOL (a)", "BootIfOL (b)"]
+    assert [group.name for group in comparison.groups] == [
+        "BootIfOL (batch_size 128)",
+        "BootIfOL (batch_size 64)",
+    ]
     (note,) = comparison.notes
-    assert f"(a) {tmp_path / 'a'}; (b) {tmp_path / 'b'}" in note
+    assert f"(batch_size 128) {tmp_path / 'a'}; (batch_size 64) {tmp_path / 'b'}" in note
     assert "agent.batch_size (128 / 64)" in note
+
+
+def test_variants_are_named_by_what_sets_them_apart_from_most(tmp_path: Path) -> None:
+    write_run(tmp_path / "a")
+    write_run(tmp_path / "b", alignment__gradient_steps=0)
+    write_run(tmp_path / "c", alignment__gradient_steps=0, interactive__reward_updates_until=1000)
+    write_run(tmp_path / "d", agent__observations="encodings")
+    write_run(tmp_path / "e", interactive__reward_updates_until=0)
+    comparison = comparison_of(tmp_path)
+    assert [group.variant for group in comparison.groups] == [
+        "",
+        "gradient_steps 0",
+        "gradient_steps 0, reward_updates_until 1000",
+        "observations encodings",
+        "reward_updates_until 0",
+    ]
+
+
+def test_variants_with_too_many_differences_have_letters(tmp_path: Path) -> None:
+    write_run(tmp_path / "a")
+    many = {f"agent__field_{number}": number for number in range(4)}
+    write_run(tmp_path / "b", **many)
+    assert [group.name for group in comparison_of(tmp_path).groups] == ["BootIfOL (a)", "BootIfOL (b)"]
 
 
 def test_runs_of_mixed_versions_are_kept_apart_and_named(tmp_path: Path) -> None:
     write_run(tmp_path / "a", seed=1)
-    write_run(tmp_path / "b", seed=2, versions={"bootifol": "0.2.0", "torch": "2.13.0"})
+    write_run(tmp_path / "b", seed=2, versions={"bootifol": "0.2.0"})
+    write_run(tmp_path / "c", seed=3, versions={"code": "def456"})
     comparison = comparison_of(tmp_path)
-    assert len(comparison.groups) == 2
-    assert "versions.bootifol (0.1.0 / 0.2.0)" in comparison.notes[0]
+    assert len(comparison.groups) == 3
+    assert "versions.bootifol (0.1.0 / 0.2.0 / 0.1.0)" in comparison.notes[0]
+    assert "versions.code (abc123 / abc123 / def456)" in comparison.notes[0]
     assert "torch" not in comparison.notes[0]
+
+
+def test_runs_that_do_not_know_their_code_are_told(tmp_path: Path) -> None:
+    for seed in (1, 2):
+        path = write_run(tmp_path / str(seed), seed=seed) / "config.json"
+        path.write_text(path.read_text().replace('"code"', '"another"'))
+    (note,) = comparison_of(tmp_path).notes
+    assert note.startswith("2 of 2 runs on Reacher Hard are older than the record of the library's code")
+
+
+def test_the_same_videos_may_lie_anywhere_and_others_are_told(tmp_path: Path) -> None:
+    def videos(count: int, digest: str) -> dict[str, dict[str, object]]:
+        return {"expert": {"count": count, "digest": digest}}
+
+    write_run(tmp_path / "a", seed=1, videos=videos(100, "aa"))
+    write_run(tmp_path / "b", seed=2, videos=videos(100, "bb"))
+    write_run(tmp_path / "c", seed=3, videos=videos(200, "bb"))
+    moved = write_run(tmp_path / "d", seed=4, videos=videos(100, "aa")) / "config.json"
+    moved.write_text(moved.read_text().replace("demos/reacher_hard", "elsewhere"))
+    comparison = comparison_of(tmp_path)
+    assert [[run.seed for run in group.runs] for group in comparison.groups] == [[1, 2, 4], [3]]
+    assert "videos.expert (100 / 200)" in comparison.notes[0]
+    assert "expert videos that were not the same" in comparison.notes[1]
+    assert "aa (2 runs), bb (2 runs)" in comparison.notes[1]
+
+
+def test_a_time_budget_on_different_processors_is_told(tmp_path: Path) -> None:
+    slow, fast = {"processor": "slow"}, {"processor": "fast"}
+    write_run(tmp_path / "a", seed=1, versions=slow, time_budget=60.0, seconds=61.0)
+    write_run(tmp_path / "b", seed=2, versions=fast, time_budget=60.0, seconds=61.0)
+    comparison = comparison_of(tmp_path)
+    assert len(comparison.groups) == 1
+    assert comparison.notes[0].endswith("buys more or less: slow (1 run), fast (1 run).")
+    write_run(tmp_path / "steps" / "a", seed=1, versions=slow)
+    write_run(tmp_path / "steps" / "b", seed=2, versions=fast)
+    assert not comparison_of(tmp_path / "steps").notes
 
 
 def test_what_changes_no_number_keeps_no_runs_apart(tmp_path: Path) -> None:
@@ -107,6 +171,14 @@ def test_unequal_budgets_between_methods_are_named(tmp_path: Path) -> None:
     notes = comparison_of(tmp_path).notes
     assert "Budgets on Reacher Hard are unequal (BootIfOL: 1 min 00 s; ViRL: 30 s)" in notes[0]
     assert notes[1] == "Also unequal between agents on Reacher Hard: agent.batch_size (128 / 64)."
+
+
+def test_unequal_terms_are_those_of_the_usual_variant(tmp_path: Path) -> None:
+    write_run(tmp_path / "a", agent__batch_size=1)
+    write_run(tmp_path / "b")
+    write_run(tmp_path / "c", alignment__gradient_steps=7)
+    write_run(tmp_path / "virl", method="virl")
+    assert not any(note.startswith("Also unequal") for note in comparison_of(tmp_path).notes)
 
 
 def test_equal_terms_need_no_note(tmp_path: Path) -> None:
@@ -137,6 +209,7 @@ def test_a_random_policy_has_no_budget_to_spend_or_to_compare(tmp_path: Path) ->
             "BootIfOL (facebook/dinov2-small)",
         ),
         ("bootifol", {"reward__bootifol__backbone": None}, "BootIfOL"),
+        ("bootifol", {"agent__cloning_weight": 1e6}, "Cloning alone"),
         ("my_module:Mine", {}, "my_module:Mine"),
     ],
 )

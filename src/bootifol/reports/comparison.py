@@ -6,9 +6,11 @@ unfair is told in a sentence: unfinished runs, seeds given twice, mixed configur
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from typing import Any
 
 from bootifol.progress import duration
 from bootifol.reports.final_return import final_return
@@ -23,6 +25,12 @@ BUDGET = ("time_budget", "interactive.agent_steps")
 SHOWN_DIFFERENCES = 6
 """Fields named in one sentence; the rest are counted."""
 
+LONGEST_VARIANT = 3
+"""Fields that a variant may be named by; where more would be needed, variants have letters."""
+
+TOLD_APART = ("processor",)
+"""Of `versions`: what keeps no runs apart, but is told."""
+
 
 @dataclass(frozen=True)
 class Group:
@@ -31,7 +39,8 @@ class Group:
     task: str
     agent: str
     variant: str
-    """A letter where an agent has several groups on a task, else empty."""
+    """Where an agent has several groups on a task: what sets this one apart, such as `gradient_steps 0`. Empty for the
+    one that has what most have, and where there is no other."""
 
     runs: tuple[RunFiles, ...]
     """In the order of their seeds."""
@@ -92,6 +101,7 @@ def compare(
     for task in dict.fromkeys(group.task for group in groups):
         notes += _mixed([group for group in groups if group.task == task])
         notes += _unequal([group for group in groups if group.task == task], compared)
+        notes += _unseen([group for group in groups if group.task == task])
     return Comparison(groups, notes)
 
 
@@ -117,14 +127,22 @@ def unfinished_because(run: RunFiles) -> str | None:
 
 def terms(run: RunFiles) -> dict[str, str]:
     """Everything but the seed that a run's numbers depend on, by name; without the sections of other methods."""
-    others = tuple(f"reward.{method}." for method in METHOD_NAMES if method != run.method)
-    config = {
+    config = decisive(run.config, run.method)
+    versions = {f"versions.{name}": value for name, value in run.versions.items() if name not in TOLD_APART}
+    videos = {f"videos.{behavior}": str(each.get("count")) for behavior, each in run.videos.items()}
+    # Where the videos themselves are known, it does not matter where they lie.
+    where = {} if videos else {"demos": run.demos}
+    return {"time_budget": str(run.time_budget), **where, **videos, **config, **versions}
+
+
+def decisive(config: Mapping[str, Any], method: str) -> dict[str, str]:
+    """The fields of a configuration that a method's numbers depend on, by dotted name."""
+    others = tuple(f"reward.{other}." for other in METHOD_NAMES if other != method)
+    return {
         name: value
-        for name, value in flattened(run.config)
+        for name, value in flattened(config)
         if name not in IRRELEVANT and not name.startswith(others)
     }
-    versions = {f"versions.{name}": value for name, value in run.versions.items()}
-    return {"time_budget": str(run.time_budget), "demos": run.demos, **config, **versions}
 
 
 def budget(run: RunFiles) -> str:
@@ -158,16 +176,44 @@ def _groups(runs: Sequence[RunFiles], agent: Callable[[RunFiles], str], notes: l
             )
         else:
             seeds[run.seed] = run
-    return [
-        Group(
-            task,
-            name,
-            _letter(number) if len(variants) > 1 else "",
-            tuple(sorted(seeds.values(), key=lambda run: run.seed or 0)),
-        )
-        for (task, name), variants in found.items()
-        for number, seeds in enumerate(variants.values())
+    groups = []
+    for (task, name), variants in found.items():
+        members = [sorted(seeds.values(), key=lambda run: run.seed or 0) for seeds in variants.values()]
+        labels = _labels([terms(runs[0]) for runs in members])
+        groups += [Group(task, name, label, tuple(runs)) for label, runs in zip(labels, members, strict=True)]
+    return groups
+
+
+def _labels(variants: Sequence[Mapping[str, str]]) -> list[str]:
+    """What sets each set of terms apart: the fields in which it has not what most of them have."""
+    fields = [
+        name
+        for name in dict.fromkeys(name for each in variants for name in each)
+        if not _agree(variants, name)
     ]
+    usual = {}
+    for name in fields:
+        (value, count), (_, next_count) = Counter(each.get(name, "absent") for each in variants).most_common(
+            2
+        )
+        usual[name] = value if count > next_count else None
+    short = [name.rpartition(".")[2] for name in fields]
+    shown = {name: last if short.count(last) == 1 else name for name, last in zip(fields, short, strict=True)}
+    named = [
+        [
+            f"{shown[name]} {each.get(name, 'absent')}"
+            for name in fields
+            if each.get(name, "absent") != usual[name]
+        ]
+        for each in variants
+    ]
+    if max(map(len, named)) > LONGEST_VARIANT:
+        return [_letter(number) for number in range(len(variants))]
+    return [", ".join(parts) for parts in named]
+
+
+def _agree(variants: Sequence[Mapping[str, str]], name: str) -> bool:
+    return len({each.get(name, "absent") for each in variants}) == 1
 
 
 def _letter(number: int) -> str:
@@ -185,7 +231,7 @@ def _mixed(groups: Sequence[Group]) -> list[str]:
     for agent, variants in groupby(groups, key=lambda group: group.agent):
         mixed = list(variants)
         if len(mixed) > 1:
-            told = "; ".join(f"({group.variant}) {paths_of(group.runs)}" for group in mixed)
+            told = "; ".join(f"({group.variant or 'usual'}) {paths_of(group.runs)}" for group in mixed)
             notes.append(
                 f"{agent} on {task_title(mixed[0].task)} is kept apart as {told}, since these differ in more than "
                 f"the seed: {_differences(mixed)}."
@@ -205,11 +251,48 @@ def _unequal(groups: Sequence[Group], compared: Collection[str]) -> list[str]:
         notes.append(
             f"Budgets on {task} are unequal ({told}), so these numbers do not compare methods alone."
         )
-    firsts = list({group.agent: group for group in learners}.values())
+    by_agent = groupby(learners, key=lambda group: group.agent)
+    firsts = [min(variants, key=lambda group: bool(group.variant)) for _, variants in by_agent]
+        min(variants, key=lambda group: bool(group.variant))
+        for _, variants in groupby(learners, key=lambda group: group.agent)
+    ]
     others = _differences(firsts, {*compared, *BUDGET}, ignored_sections=("reward.",))
     if others:
         notes.append(f"Also unequal between agents on {task}: {others}.")
     return notes
+
+
+def _unseen(groups: Sequence[Group]) -> list[str]:
+    """What keeps no runs apart and yet bears on a comparison: unknown code, other videos, other processors."""
+    task, runs = task_title(groups[0].task), [run for group in groups for run in group.runs]
+    notes = []
+    unknown = sum("code" not in run.versions for run in runs)
+    if unknown:
+        notes.append(
+            f"{unknown} of {len(runs)} runs on {task} are older than the record of the library's code, so nothing here "
+            "tells whether they are of one version."
+        )
+    learners = [run for run in runs if run.method not in LEARN_NOTHING]
+    for behavior in dict.fromkeys(behavior for run in learners for behavior in run.videos):
+        digests = [str(run.videos[behavior].get("digest")) for run in learners if behavior in run.videos]
+        if len(set(digests)) > 1:
+            notes.append(
+                f"Runs on {task} learned from {behavior} videos that were not the same, such as those recorded on "
+                f"another machine or at another size: {_counted(digests)}."
+            )
+    processors = [run.versions.get("processor", "unknown") for run in learners if run.time_budget is not None]
+    if len(set(processors)) > 1:
+        notes.append(
+            f"Runs on {task} had their time on different processors, on which it buys more or less: "
+            f"{_counted(processors)}."
+        )
+    return notes
+
+
+def _counted(values: Sequence[str]) -> str:
+    return ", ".join(
+        f"{value} ({count} run{'s' if count > 1 else ''})" for value, count in Counter(values).items()
+    )
 
 
 def _differences(

@@ -19,6 +19,9 @@ METHOD_NAMES = {
 LEARN_NOTHING = {"random", "expert"}
 """Ends of the scale, which are played but not trained: they have final episodes, no budget and no curve."""
 
+CLONING_ALONE = 1e6
+"""From so large a `cloning_weight` on, no reward is heard: the agent is a clone of the videos, whatever the method."""
+
 
 def task_title(task: str) -> str:
     """Reacher Hard of reacher_hard; names with a colon are other people's and stay as they are."""
@@ -28,6 +31,8 @@ def task_title(task: str) -> str:
 def agent_name(run: RunFiles) -> str:
     """The paper's name of what a run trained, such as `CT (n=10)`; any other method's own name."""
     config = dict(flattened(run.config))
+    if float(config.get("agent.cloning_weight", 0.0)) >= CLONING_ALONE:
+        return "Cloning alone"
     name = METHOD_NAMES.get(run.method, run.method)
     if run.method == "context_translation":
         return f"{name} (n={config.get('reward.context_translation.references', '?')})"

@@ -127,13 +127,13 @@ def _rows(groups: Sequence[Group], papers: Mapping[str, PaperReturn], measure: M
             rows.append(ResultRow(groups[0].task, agent, (), 0, None, level, paper))
         elif agent in papers and agent not in ENDS and not own:
             rows.append(ResultRow(groups[0].task, agent, (), 0, None, None, paper))
+        has_usual = any(not group.variant for group in own)
         for group in own:
             finals = finals_of(group)
             episodes = sum(final.environment_return.count for final in finals)
-            row = ResultRow(
-                group.task, group.name, group.runs, episodes, over_seeds(finals, measure), None, paper
-            )
-            rows.append(row)
+            summary = over_seeds(finals, measure)
+            theirs = None if group.variant and has_usual else paper
+            rows.append(ResultRow(group.task, group.name, group.runs, episodes, summary, None, theirs))
     return rows
 
 

@@ -75,6 +75,11 @@ class RunFiles:
     command: str
     config: Mapping[str, Any]
     versions: Mapping[str, str]
+    """Of packages; also `code`, a digest of the library's own, and `processor`. Old runs lack these two."""
+
+    videos: Mapping[str, Mapping[str, Any]]
+    """`count` and `digest` of the expert's and of the random videos; empty for old runs."""
+
     curves: Mapping[tuple[str, str], Curve]
     """Metrics by phase and name."""
 
@@ -223,6 +228,11 @@ def read_run(run_dir: Path) -> RunFiles:
         command=_as_text(header.get("command", "")),
         config=_as_mapping(header.get("config"), "config", notes),
         versions={k: str(v) for k, v in _as_mapping(header.get("versions"), "versions", notes).items()},
+        videos={
+            k: v
+            for k, v in _as_mapping(header.get("videos", {}), "videos", notes).items()
+            if isinstance(v, dict)
+        },
         curves=curves,
         seconds=max(seconds) if seconds else None,
         evaluations=evaluations,

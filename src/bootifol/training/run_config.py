@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import platform
 import typing
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,20 +12,9 @@ from bootifol.errors import BootifolError
 from bootifol.files import read_json, write_json
 from bootifol.tasks import Task, task_named
 from bootifol.training.config import TrainingConfig
+from bootifol.training.provenance import versions, videos_in
 
 FORMAT = 1
-_PACKAGES = (
-    "bootifol",
-    "torch",
-    "numpy",
-    "mujoco",
-    "dm-control",
-    "metaworld",
-    "gymnasium",
-    "numba",
-    "safetensors",
-    "transformers",
-)
 _Config = TypeVar("_Config")
 
 
@@ -51,7 +38,7 @@ class RunConfig:
         return task_named(self.task, config.action_repeat, config.episode_steps, config.evaluation_steps)
 
     def write(self, directory: Path, command: list[str]) -> None:
-        """Writes `config.json`."""
+        """Writes `config.json`, with what else the run's numbers depend on: versions, code, processor, videos."""
         write_json(
             directory / "config.json",
             {
@@ -65,6 +52,7 @@ class RunConfig:
                 "command": command,
                 "config": dataclasses.asdict(self.training),
                 "versions": versions(),
+                "videos": videos_in(Path(self.demos)),
             },
         )
 
@@ -117,14 +105,3 @@ def from_json(kind: type[_Config], data: dict[str, Any], where: str) -> _Config:
         else:
             values[name] = tuple(value) if isinstance(value, list) else value
     return kind(**values)
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything that a run's numbers depend on."""
-    found = {"python": platform.python_version(), "machine": platform.machine()}
-    for package in _PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
-    return found
