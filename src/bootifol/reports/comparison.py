@@ -253,9 +253,6 @@ def _unequal(groups: Sequence[Group], compared: Collection[str]) -> list[str]:
         )
     by_agent = groupby(learners, key=lambda group: group.agent)
     firsts = [min(variants, key=lambda group: bool(group.variant)) for _, variants in by_agent]
-        min(variants, key=lambda group: bool(group.variant))
-        for _, variants in groupby(learners, key=lambda group: group.agent)
-    ]
     others = _differences(firsts, {*compared, *BUDGET}, ignored_sections=("reward.",))
     if others:
         notes.append(f"Also unequal between agents on {task}: {others}.")
