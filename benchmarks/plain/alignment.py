@@ -1,13 +1,10 @@
-"""The paper's Alignment Phase written straight from its equations: one frame, one video, one step at a time, float32.
+"""The paper's losses, colors and networks written straight from its equations and tables, in float32.
 
-It shares no code with `bootifol.rewards`, so that the tests may compare the two, and it is what the speed of the
-library is measured against. Frames are encoded time step by time step (a batch of one frame of every video), the
-LSTM runs cell by cell, losses loop over their anchors.
+They share no code with `bootifol.rewards`, so that the tests may compare the two. Losses loop over their anchors, one
+frame and one video at a time; `bootifol.py` beside it has them in batches.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 import torch
@@ -110,96 +107,3 @@ def decoder(divisor: int = 1) -> nn.Sequential:
         ]
     modules += [nn.ConvTranspose2d(64 // divisor, 3, 5, 2, output_padding=1)]
     return nn.Sequential(*modules)
-
-
-class PlainBootifol:
-    """The paper's reward model on 64x64 videos.
-
-    Args:
-        divisor: divides the widths of encoders and decoder.
-        seed: of the parameters and draws.
-    """
-
-    def __init__(self, divisor: int = 1, seed: int = 0) -> None:
-        torch.manual_seed(seed)
-        self.rng = np.random.default_rng(seed)
-        self.encoder_1, self.encoder_2 = view_encoder(1, divisor), view_encoder(2, divisor)
-        self.decoder = decoder(divisor)
-        self.cell_1, self.cell_2 = nn.LSTMCell(128, 128), nn.LSTMCell(128, 128)
-        self.output = nn.Linear(128, 128)
-        self.predictor = nn.Sequential(nn.Linear(128, 128), nn.LeakyReLU(LEAK), nn.Linear(128, 128))
-        self.networks = nn.ModuleList(
-            [
-                self.encoder_1,
-                self.encoder_2,
-                self.decoder,
-                self.cell_1,
-                self.cell_2,
-                self.output,
-                self.predictor,
-            ]
-        )
-        self.optimizer = torch.optim.Adam(self.networks.parameters(), lr=1e-4)
-
-    def encode_frames(self, pictures: torch.Tensor) -> torch.Tensor:
-        """Normalized Lab `[B, 3, 64, 64]` to states `[B, 128]`."""
-        return torch.cat([self.encoder_1(pictures[:, :1]), self.encoder_2(pictures[:, 1:])], dim=1).flatten(1)
-
-    def encode_sequence(self, states: list[torch.Tensor]) -> list[torch.Tensor]:
-        """States `[B, 128]` frame by frame to encodings z `[B, 128]` of every prefix."""
-        first = second = None
-        encodings = []
-        for state in states:
-            first = self.cell_1(state, first)
-            second = self.cell_2(first[0], second)
-            encodings.append(self.output(second[0]))
-        return encodings
-
-    def loss(self, expert: NDArray[np.uint8], other: NDArray[np.uint8]) -> torch.Tensor:
-        """L on n expert and n other videos, uint8 `[n, T + 1, 64, 64, 3]` each."""
-        videos = np.concatenate([expert, other])
-        videos = videos[:, self.rng.random(videos.shape[1]) >= 0.05]
-        count, length = videos.shape[:2]
-        states, reconstruction = [], torch.zeros(())
-        for t in range(length):
-            pictures = torch.from_numpy(np.stack([lab(videos[i, t]) for i in range(count)])).float()
-            states.append(self.encode_frames(pictures))
-            decoded = self.decoder(states[t][:, :, None, None])
-            reconstruction = reconstruction + ((pictures - decoded) ** 2).mean() / length
-        by_video = torch.stack(states, dim=1)
-        every_frame = by_video.flatten(0, 1)
-        total = reconstruction + multiview_loss(every_frame[:, :64], every_frame[:, 64:])
-        start = int(self.rng.integers(5, length - PREDICTED))
-        for i in range(count):
-            triplets = []
-            for anchor in range(length):
-                near = [t for t in range(length) if 0 < abs(t - anchor) <= WINDOW]
-                far = [t for t in range(length) if abs(t - anchor) > WINDOW]
-                triplets.append((anchor, int(self.rng.choice(near)), int(self.rng.choice(far))))
-            total = total + triplet_loss(by_video[i], triplets) / count
-            prefix = [by_video[i : i + 1, t] for t in range(start + 1)]
-            for _ in range(PREDICTED):
-                prefix.append(self.predictor(self.encode_sequence(prefix)[-1]))
-            total = total + prediction_loss(torch.cat(prefix[start + 1 :]), by_video[i], start) / count
-        last = self.encode_sequence(states)[-1]
-        return total + sequence_loss(last[: len(expert)], last[len(expert) :])
-
-    def alignment_step(self, expert: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
-        """One gradient step of the Alignment Phase; returns L."""
-        loss = self.loss(expert, other)
-        self.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        self.optimizer.step()
-        return float(loss.detach())
-
-    @torch.no_grad()
-    def label(self, video: NDArray[np.uint8], reference: NDArray[np.uint8]) -> list[float]:
-        """`r_{t+1} = -||f(o_{0:t+1}) - f(o_{e,0:t+1})||` for every step, both videos `[T + 1, 64, 64, 3]`."""
-        self.networks.eval()
-        encodings = []
-        for frames in (video, reference):
-            states = [self.encode_frames(torch.from_numpy(lab(frame)).float()[None]) for frame in frames]
-            encodings.append(self.encode_sequence(states))
-        self.networks.train()
-        pairs = zip(encodings[0][1:], encodings[1][1:], strict=False)
-        return [-math.sqrt(float(((z - z_expert) ** 2).sum())) for z, z_expert in pairs]
