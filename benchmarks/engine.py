@@ -1,8 +1,8 @@
 """What each stage costs beside a plain version of the same work, in one run: `make bench`.
 
-The plain versions (`benchmarks/plain`) are fp32, written straight from the equations, and tested against ours. Inputs
-are random, both sides get the same, and the two are timed in turn, so that a busy machine slows both. Quote the
-ratios; absolute times belong to a machine.
+The plain versions (`benchmarks/plain`) are ordinary PyTorch in fp32; tests hold the same weights and draws to the same
+losses, gradients and rewards. *fp32* is our own code without bf16. Inputs are random, all sides get the same, and they
+are timed in turn, so that a busy machine slows all. Quote the ratios; absolute times belong to a machine.
 
 The floor is what the machine could not beat: the stage's arithmetic (matrix products and convolutions, as PyTorch
 counts them; its fused LSTM is not counted) at the rate of a large matrix product, plus the bytes that must move
@@ -15,7 +15,7 @@ import argparse
 import itertools
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -28,7 +28,7 @@ from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
 
 from benchmarks.command import command
-from benchmarks.plain.alignment import PlainBootifol
+from benchmarks.plain.bootifol import PlainBootifol
 from benchmarks.plain.drqv2 import PlainDrQv2, PlainReplay
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.envs.pictures import RenderProfile
@@ -55,15 +55,26 @@ STAGES = ["environment", "meta_world", "update", "alignment", "label"]
 Work = Callable[[], object]
 
 
+REPLAY_BYTES = 500_000_000
+"""Of frames, in the timed replay: far more than any processor's cache, as in a run."""
+
+BLOCK = 50
+"""Environment steps that are timed at a stretch: a switch from one OpenGL context to another is no part of a step."""
+
+
 class Stage(NamedTuple):
-    """The same work twice."""
+    """The same work several times."""
 
     ours: Work
     plain: Work
+    fp32: Work | None
+    """Ours without bf16; None where nothing is computed in it."""
     parameters: int | None
     """Trained by it (0: none); None where a floor of arithmetic and bytes says nothing: simulation, rendering."""
     pixels: int
     """Bytes of pictures that it reads."""
+    block: int = 1
+    """How often the work is done at a stretch."""
 
 
 class Rates(NamedTuple):
@@ -103,7 +114,7 @@ def environment_step(config: TrainingConfig, task: str) -> Stage:
         taken = itertools.cycle(actions)
         return lambda: environment.step(next(taken))
 
-    return Stage(stepper(config.pictures.profile), stepper("full"), None, 0)
+    return Stage(stepper(config.pictures.profile), stepper("full"), None, None, 0, BLOCK)
 
 
 def agent_update(config: TrainingConfig) -> Stage:
@@ -111,16 +122,22 @@ def agent_update(config: TrainingConfig) -> Stage:
     agent_config, pictures = config.agent, config.pictures
     size, stack, batch_size = pictures.agent_size, pictures.stack, agent_config.batch_size
     rng = np.random.default_rng(0)
-    replay = ReplayBuffer(40 * FRAMES, size, ACTION_DIM, stack, agent_config.n_step, agent_config.discount)
+    episodes = REPLAY_BYTES // (FRAMES * 3 * size**2)
+    replay = ReplayBuffer(
+        episodes * FRAMES, size, ACTION_DIM, stack, agent_config.n_step, agent_config.discount
+    )
     plain_replay = PlainReplay(stack, agent_config.n_step, agent_config.discount)
-    for index in range(40):
+    for index in range(episodes):
         frames = rng.integers(0, 256, (FRAMES, size, size, 3), dtype=np.uint8)
         actions = rng.uniform(-1, 1, (FRAMES - 1, ACTION_DIM)).astype(np.float32)
         episode = Episode(frames, actions, Video(str(index), frames), False)
         rewards = rng.normal(size=FRAMES - 1).astype(np.float32)
         replay.add(episode, rewards)
         plain_replay.add(episode, rewards)
-    agent = DrQv2(agent_config, size, stack, ACTION_DIM, 0)
+    agent, in_fp32 = (
+        DrQv2(replace(agent_config, precision=precision), size, stack, ACTION_DIM, 0)
+        for precision in ("bf16", "fp32")
+    )
     plain = PlainDrQv2(
         size,
         stack,
@@ -137,20 +154,27 @@ def agent_update(config: TrainingConfig) -> Stage:
 
     trained = count_parameters(agent.encoder, agent.actor, agent.critic)
     pixels = 2 * batch_size * 3 * stack * size**2
-    return Stage(lambda: agent.update(replay.sample(batch_size, rng), 0), plain_update, trained, pixels)
+    return Stage(
+        lambda: agent.update(replay.sample(batch_size, rng), 0),
+        plain_update,
+        lambda: in_fp32.update(replay.sample(batch_size, rng), 0),
+        trained,
+        pixels,
+    )
 
 
 def alignment_step(config: TrainingConfig, reward: BootifolConfig) -> Stage:
     """One gradient step of the reward on n expert and n other videos, every loss on every frame on both sides."""
     rng = np.random.default_rng(0)
     videos = RandomVideos(2 * reward.videos_per_class, config.pictures.video_size, rng)
-    same_work = replace(reward, frames_per_video=None, frame_drop=0.0, sequence_times=1)
-    model = BootifolRewardModel(same_work, config.pictures.video_size, 0)
+    same_work = replace(reward, frames_per_video=None, sequence_times=1, motion=False)
+    model, in_fp32 = in_both_precisions(same_work, config.pictures.video_size)
     plain = PlainBootifol(reward.width_divisor)
     n = reward.videos_per_class
     return Stage(
         lambda: model.update(videos, videos),
         lambda: plain.alignment_step(videos.sample(n, rng), videos.sample(n, rng)),
+        lambda: in_fp32.update(videos, videos),
         count_parameters(model.networks),
         videos.frames.nbytes,
     )
@@ -160,15 +184,32 @@ def label_episode(config: TrainingConfig, reward: BootifolConfig, frames: int = 
     """Rewarding an episode against one expert video whose encoding is not cached yet."""
     rng = np.random.default_rng(0)
     videos = RandomVideos(2, config.pictures.video_size, rng, frames)
-    one_reference = replace(reward, references=1, aggregate="mean")
-    model = BootifolRewardModel(one_reference, config.pictures.video_size, 0)
+    one_reference = replace(reward, references=1, aggregate="mean", motion=False)
+    models = in_both_precisions(one_reference, config.pictures.video_size)
     plain = PlainBootifol(reward.width_divisor)
     names = iter(range(10**9))
 
-    def label() -> None:
+    def label(model: BootifolRewardModel) -> None:
         model.label(videos[0], [Video(f"never seen {next(names)}", videos.frames[1])])
 
-    return Stage(label, lambda: plain.label(videos.frames[0], videos.frames[1]), 0, videos.frames.nbytes)
+    return Stage(
+        partial(label, models[0]),
+        lambda: plain.label(videos.frames[0], videos.frames[1]),
+        partial(label, models[1]),
+        0,
+        videos.frames.nbytes,
+    )
+
+
+def in_both_precisions(
+    reward: BootifolConfig, video_size: int
+) -> tuple[BootifolRewardModel, BootifolRewardModel]:
+    """The reward model in bf16, and in fp32."""
+    bf16, fp32 = (
+        BootifolRewardModel(replace(reward, precision=precision), video_size, 0)
+        for precision in ("bf16", "fp32")
+    )
+    return bf16, fp32
 
 
 def count_parameters(*networks: nn.Module) -> int:
@@ -201,23 +242,24 @@ def floor(stage: Stage, rates: Rates) -> float | None:
     if stage.parameters is None:
         return None
     with FlopCounterMode(display=False) as counter:
-        stage.ours()
+        stage.plain()  # ours also computes columns of film strips that nobody reads
     # Read: parameter, gradient, both averages; written: parameter and averages; 4 bytes each.
     moved = stage.pixels + 7 * 4 * stage.parameters
     seconds: float = counter.get_total_flops() / rates.arithmetic + moved / rates.copy
     return 1e3 * seconds
 
 
-def medians(ours: Work, plain: Work, runs: int, warm_up: int) -> tuple[float, float]:
-    """Median milliseconds of both, timed in turn."""
-    times: tuple[list[float], list[float]] = ([], [])
-    for run in range(runs + warm_up):
-        for work, kept in zip((ours, plain), times, strict=True):
+def medians(works: Sequence[Work], runs: int, block: int) -> list[float]:
+    """Median milliseconds of each, timed in turn in blocks, after a block of each that is not counted."""
+    times: list[list[float]] = [[] for _ in works]
+    for run in range(runs + 1):
+        for work, kept in zip(works, times, strict=True):
             started = time.perf_counter()
-            work()
-            if run >= warm_up:
-                kept.append(1e3 * (time.perf_counter() - started))
-    return statistics.median(times[0]), statistics.median(times[1])
+            for _ in range(block):
+                work()
+            if run:
+                kept.append(1e3 * (time.perf_counter() - started) / block)
+    return [statistics.median(kept) for kept in times]
 
 
 @command()
@@ -238,7 +280,7 @@ def main() -> None:
         "stage",
         *(
             Column(name, justify="right")
-            for name in ("ours ms", "plain ms", "plain / ours", "floor ms", "floor / ours")
+            for name in ("ours ms", "fp32 ms", "plain ms", "plain / ours", "floor ms", "floor / ours")
         ),
         title=f"{arguments.threads} thread(s), {rates.arithmetic / 1e9:.0f} GFLOP/s in bf16, copies of "
         f"{rates.copy / 1e9:.1f} GB/s",
@@ -247,23 +289,22 @@ def main() -> None:
     with progress("timing", total=len(arguments.stages) * len(arguments.sizes)) as advance:
         for name in arguments.sizes:
             config = presets[name]
-            # bf16 is ours to use at the paper's sizes too; the plain version is fp32 by definition.
-            reward = replace(config.reward.bootifol, precision="bf16")
+            reward = config.reward.bootifol
             stages: dict[str, tuple[str, Callable[[], Stage], int]] = {
                 "environment": (
                     "agent step of reacher_hard (plain: full quality)",
                     partial(environment_step, config, "reacher_hard"),
-                    50,
+                    5,
                 ),
                 "meta_world": (
                     "agent step of button_press (plain: full quality)",
                     partial(environment_step, config, "button_press"),
-                    20,
+                    3,
                 ),
                 "update": ("sample and RL update", partial(agent_update, config), arguments.runs + 2),
                 "alignment": ("alignment step", partial(alignment_step, config, reward), arguments.runs),
                 "label": (
-                    "label an episode of 61 frames",
+                    "label an episode of 61 frames against one reference that is not cached",
                     partial(label_episode, config, reward),
                     arguments.runs + 2,
                 ),
@@ -272,11 +313,13 @@ def main() -> None:
                 title, make, runs = stages[key]
                 work = make()
                 least = floor(work, rates)
-                ours, plain = medians(work.ours, work.plain, runs, warm_up=1)
+                sides = [work.ours, work.plain, *([work.fp32] if work.fp32 else [])]
+                ours, plain, *fp32 = medians(sides, runs, work.block)
                 table.add_row(
                     name,
                     title,
                     f"{ours:.1f}",
+                    "".join(f"{each:.1f}" for each in fp32),
                     f"{plain:.1f}",
                     f"{plain / ours:.1f}",
                     "" if least is None else f"{least:.1f}",

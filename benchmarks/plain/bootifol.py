@@ -64,7 +64,8 @@ class PlainBootifol:
 
     def encode_frames(self, pictures: Tensor) -> Tensor:
         """Normalized Lab `[N, 3, 64, 64]` to states `[N, 128]`."""
-        return torch.cat([self.encoder_1(pictures[:, :1]), self.encoder_2(pictures[:, 1:])], dim=1).flatten(1)
+        views = self.encoder_1(pictures[:, :1]), self.encoder_2(pictures[:, 1:])
+        return torch.cat(views, dim=1).flatten(1)
 
     def encode_sequence(self, states: Tensor) -> Tensor:
         """States `[B, T', 128]` to encodings z `[B, T', 128]` of every prefix."""
@@ -89,7 +90,7 @@ class PlainBootifol:
         count, length = videos.shape[:2]
         pictures = pictures_of(videos.reshape(-1, *videos.shape[2:]))
         every = self.encode_frames(pictures)
-        states = every.unflatten(0, (count, length))
+        states = every.reshape(count, length, -1)
         reconstruction = ((pictures - self.decoder(every[:, :, None, None])) ** 2).mean()
 
         alike = normalize(every[:, :64]) @ normalize(every[:, 64:]).T / TEMPERATURE
@@ -113,7 +114,8 @@ class PlainBootifol:
 
         one, two = self.encode_sequence(states)[:, -1].chunk(2)
         sequence = (contrasted(one, two) + contrasted(two, one)) / 2
-        return reconstruction + multiview + triplet + prediction + sequence
+        total: Tensor = reconstruction + multiview + triplet + prediction + sequence
+        return total
 
     def alignment_step(self, expert: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
         """One gradient step of the Alignment Phase; returns L."""
@@ -128,9 +130,10 @@ class PlainBootifol:
         """`r_{t+1} = -||f(o_{0:t+1}) - f(o_{e,0:t+1})||` for every step `[T]`, both videos `[T + 1, 64, 64, 3]`."""
         self.networks.eval()
         states = self.encode_frames(pictures_of(np.concatenate([video, reference])))
-        own, expert = self.encode_sequence(states.unflatten(0, (2, len(video))))
+        own, expert = self.encode_sequence(states.reshape(2, len(video), -1))
         self.networks.train()
-        return -(own - expert).norm(dim=1)[1:]
+        rewards: Tensor = -torch.linalg.vector_norm(own - expert, dim=1)[1:]
+        return rewards
 
 
 def pictures_of(frames: NDArray[np.uint8]) -> Tensor:
