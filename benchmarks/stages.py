@@ -1,0 +1,239 @@
+"""Where does the time of a run go? What each stage costs, how often a run does it, and what share of the run that is.
+
+    python -m benchmarks.stages --preset cpu --task reacher_hard --demos demos/reacher_hard
+    python -m benchmarks.stages --demos demos/reacher_hard --config.agent.update-every 8   # any field of the preset
+
+Every stage is timed on the preset's own sizes, with the videos and the replay of a run after its warm-up: medians of
+`--runs` calls after one that is not counted. How often each happens in the preset's own count of agent steps, without
+a time budget, follows from its configuration, so no run has to be played to its end. The floor is what the machine
+could not beat: the stage's arithmetic, as PyTorch counts it, at the measured rate of a large bf16 matrix product.
+Markdown.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+from torch.utils.flop_counter import FlopCounterMode
+
+from benchmarks.command import command
+from benchmarks.engine import measured_rates
+from benchmarks.rows import markdown
+from bootifol.cli.train import preset_of
+from bootifol.evaluation.ranking import draw_references
+from bootifol.progress import progress
+from bootifol.tracking import Tracker
+from bootifol.training.config import TrainingConfig
+from bootifol.training.run_config import RunConfig
+from bootifol.training.train import Run
+
+HEADER = ("stage", "in a run", "ms each", "floor ms", "ms an agent step", "share")
+
+HIGHEST_RATE = 1e-4
+"""Learning rate of the timed steps of the Cloning Phase: what it is changes no time."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of a run."""
+
+    name: str
+    calls: float
+    """In a whole run."""
+    work: Callable[[], object]
+    computes: bool = True
+    """Whether a floor of arithmetic says something: not of simulation, rendering and files."""
+    slow: bool = False
+    """Takes seconds, and is timed once."""
+
+
+def stages_of(run: Run) -> Iterator[Stage]:
+    """Every stage of a run that has been warmed up, in the order of a run."""
+    config, parts, interactive = run.run.training, run.components, run.interactive
+    steps, warm_up = config.interactive.agent_steps, config.agent.warm_up_steps
+    acting, model, agent = steps - warm_up, parts.reward_model, parts.agent
+    until = steps if model.keeps_learning else min(config.interactive.reward_updates_until, steps)
+    updates = acting / config.agent.update_every
+    reward_updates = max(until - warm_up, 0) / config.interactive.reward_update_every
+
+    alignment = model.align(run.demos.expert, run.demos.random)
+    if config.alignment.gradient_steps and next(alignment, None) is not None:
+        yield Stage("alignment step", config.alignment.gradient_steps, functools.partial(next, alignment))
+    if parts.demonstrations is not None:
+        shown, rng = parts.demonstrations, run.rng
+        phases = shown.config.phases
+        yield Stage(
+            "Cloning Phase: gradient step of the inverse dynamics",
+            phases * shown.config.inverse_dynamics_updates,
+            lambda: shown.learn_inverse_dynamics(parts.replay, 0, rng, HIGHEST_RATE),
+        )
+
+        def infer_all() -> None:
+            for index in range(len(shown)):
+                shown.infer(index, model, rng)
+
+        yield Stage(
+            f"Cloning Phase: actions and rewards of {len(shown):,} videos", phases, infer_all, slow=True
+        )
+        yield Stage(
+            "Cloning Phase: gradient step of the clone",
+            phases * shown.config.cloning_updates,
+            lambda: agent.clone(shown.sample(config.agent.batch_size, rng), HIGHEST_RATE),
+        )
+    environment = interactive.environment
+    observation, _ = environment.reset(seed=0)
+    action = agent.act(observation, 0, explore=True)
+
+    def step() -> None:
+        _, _, terminated, truncated, _ = environment.step(action)
+        if terminated or truncated:
+            environment.reset(seed=0)
+
+    yield Stage("agent step of the environment", steps, step, computes=False)
+    yield Stage("action of the agent", acting, lambda: agent.act(observation, 0, explore=True))
+    yield Stage(
+        "batch from replay", updates, lambda: interactive._batch(config.agent.batch_size), computes=False
+    )
+    batch = interactive._batch(config.agent.batch_size)
+    yield Stage("update of the agent", updates, lambda: agent.update(batch, 0))
+    if reward_updates:
+        yield Stage(
+            "gradient step of the reward",
+            reward_updates,
+            lambda: model.update(run.demos.expert, parts.agent_videos),
+        )
+        if config.interactive.relabel_episodes:
+            yield Stage(
+                "renewing a stored episode's rewards",
+                reward_updates * config.interactive.relabel_episodes,
+                interactive._relabel_one,
+            )
+    video, numbers = parts.agent_videos[0], itertools.count()
+    references = draw_references(model, run.demos.expert, run.rng)
+
+    def label_anew() -> None:
+        unknown = [replace(each, name=f"never seen {next(numbers)}") for each in references]
+        model.label(video, unknown)
+
+    # As soon as the reward has learned, nothing is left of the encodings of expert videos.
+    length = run.task.episode_steps
+    yield Stage("rewarding an episode while the reward learns", until / length, label_anew)
+    at_rest = (steps - until) / length
+    yield Stage("rewarding an episode when it rests", at_rest, lambda: model.label(video, references))
+    evaluations = steps / config.evaluation.every
+    yield Stage("evaluation on the way", evaluations, run._evaluate_while_training, computes=False, slow=True)
+    yield Stage("checkpoint, each 20 minutes", 0, run._checkpoint, computes=False, slow=True)
+
+
+def warm_up(run: Run) -> None:
+    """The episodes with which every run begins, so that replay and the agent's videos have something in them."""
+    steps = run.run.training.agent.warm_up_steps
+    with progress("warm-up", steps) as advance:
+        while run.counters.agent_steps < steps:
+            before = run.counters.agent_steps
+            run.interactive.play_episode()
+            advance(run.counters.agent_steps - before)
+
+
+def milliseconds(stage: Stage, runs: int) -> float:
+    """The median of some calls, quick ones in blocks, after one that is not counted."""
+    block = 1
+    if stage.slow:
+        runs = 1
+    else:
+        started = time.perf_counter()
+        stage.work()
+        block = max(1, int(0.02 / max(time.perf_counter() - started, 1e-6)))
+    times = []
+    for _ in range(runs):
+        started = time.perf_counter()
+        for _ in range(block):
+            stage.work()
+        times.append(1e3 * (time.perf_counter() - started) / block)
+    return statistics.median(times)
+
+
+def floor(stage: Stage, arithmetic: float) -> float | None:
+    """Milliseconds of its arithmetic at the machine's rate; None where there is none to count."""
+    if not stage.computes:
+        return None
+    with FlopCounterMode(display=False) as counter:
+        stage.work()
+    operations: int = counter.get_total_flops()
+    return 1e3 * operations / arithmetic
+
+
+def measure(
+    config: Annotated[TrainingConfig, tyro.conf.arg(name="config")],
+    demos: Path,
+    task: str = "reacher_hard",
+    method: str = "bootifol",
+    preset: str = "cpu",
+    runs: int = 9,
+) -> None:
+    """Where the time of a run goes.
+
+    Args:
+        config: every setting of the preset, which `--config.SECTION.FIELD` changes one by one.
+        demos: directory of the videos.
+        task: in whose environment to act.
+        method: whose reward.
+        preset: whose sizes and counts.
+        runs: timed calls of each stage.
+    """
+    steps = config.interactive.agent_steps
+    arithmetic = measured_rates().arithmetic
+    with tempfile.TemporaryDirectory() as temporary:
+        short = replace(config, tensorboard=False)
+        run = Run(
+            RunConfig(task, method, preset, 1, str(demos), None, short), Path(temporary), Console(stderr=True)
+        )
+        warm_up(run)
+        rows = []
+        run.tracker = Tracker(Path(temporary), tensorboard=False)
+        for stage in stages_of(run):
+            each = milliseconds(stage, runs)
+            rows.append((stage, each, floor(stage, arithmetic)))
+            print(f"{stage.name}: {each:.2f} ms", file=sys.stderr, flush=True)
+    total = sum(stage.calls * each for stage, each, _ in rows)
+    cells = [
+        [
+            stage.name,
+            f"{stage.calls:,.0f}" if stage.calls else "–",
+            f"{each:.2f}",
+            "" if least is None else f"{least:.2f}",
+            f"{stage.calls * each / steps:.2f}" if stage.calls else "–",
+            f"{stage.calls * each / total:.0%}" if stage.calls else "–",
+        ]
+        for stage, each, least in rows
+    ]
+    cells.append(
+        ["all", f"{steps:,} agent steps", "", "", f"{total / steps:.2f}", f"{total / 6e4:.0f} minutes"]
+    )
+    print(f"{config.threads} thread(s), {arithmetic / 1e9:.0f} GFLOP/s in bf16\n")
+    print(markdown(HEADER, cells))
+
+
+@command()
+def main() -> None:
+    words = sys.argv[1:]
+    tyro.cli(
+        functools.partial(measure, config=preset_of(words)),
+        args=words,
+        config=(tyro.conf.FlagConversionOff,),
+    )
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
