@@ -56,6 +56,21 @@ def test_a_picture_is_the_centered_square_that_import_cuts_out_too() -> None:
     assert not (picture == (255, 0, 0)).all(axis=-1).any(), "the border is left out"
 
 
+def test_an_environment_may_draw_every_picture_into_the_same_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    environment = make_environment(SLIDE, PictureConfig(20, 20), 4)
+    slide, memory = environment.simulator.environment.unwrapped, np.zeros((20, 32, 3), np.uint8)
+    render = slide.render
+
+    def render_into_memory() -> np.ndarray:
+        memory[:] = render()
+        return memory
+
+    _, first = environment.reset(seed=0)
+    monkeypatch.setattr(slide, "render", render_into_memory)
+    frames = [environment.step(np.float32([1.0, 0.0]))[4]["frame"] for _ in range(3)]
+    assert len({frame.tobytes() for frame in [first["frame"], *frames]}) == 4
+
+
 def test_the_same_seed_gives_the_same_start_in_any_instance() -> None:
     def start(seed: int) -> np.ndarray:
         environment = make_environment(SLIDE, SIZES, 4)

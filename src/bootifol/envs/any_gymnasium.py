@@ -14,7 +14,7 @@ import numpy as np
 from gymnasium.wrappers import TimeLimit
 
 from bootifol.envs.camera import prepare_opengl
-from bootifol.envs.pictures import PictureConfig, centered_square
+from bootifol.envs.pictures import PictureConfig, centered_square, is_picture, told_kind
 from bootifol.errors import BootifolError
 from bootifol.own_modules import is_own_name, own_callable, told, where
 from bootifol.types import Action, Frame
@@ -90,24 +90,14 @@ class GymnasiumSimulator:
                 f"{self.name} cannot render pictures here: {told(error)} (is a package missing, or OpenGL? "
                 "`bootifol doctor` tries the latter)"
             ) from error
-        if not (
-            isinstance(picture, np.ndarray)
-            and picture.dtype == np.uint8
-            and picture.ndim == 3
-            and picture.shape[2] == 3
-            and picture.size
-        ):
-            found = (
-                f"{picture.dtype} {list(picture.shape)}"
-                if isinstance(picture, np.ndarray)
-                else type(picture).__name__
-            )
+        if not is_picture(picture):
             raise BootifolError(
-                f"{self.name} renders {found} where a picture is wanted: make its render() return a uint8 array "
-                "[height, width, 3]"
+                f"{self.name} renders {told_kind(picture)} where a picture is wanted: make its render() return a "
+                "uint8 array [height, width, 3]"
             )
         _close_at_exit(self)
-        return centered_square(picture, self._size)
+        # A copy, for an environment may draw its next picture into the same memory.
+        return centered_square(picture, self._size).copy()
 
     def close(self) -> None:
         viewer = self._mujoco_viewer()
