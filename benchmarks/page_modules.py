@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-ADD_A_METHOD = Path(__file__).parents[1] / "docs" / "add_a_method.md"
+_DOCS = Path(__file__).parents[1] / "docs"
+ADD_A_METHOD = _DOCS / "add_a_method.md"
+USE_A_POLICY = _DOCS / "use_a_policy.md"
 
 
 def write_page_modules(page: Path, directory: Path) -> list[Path]:

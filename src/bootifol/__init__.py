@@ -7,6 +7,7 @@ The same as the command line, from Python:
     bootifol.record_demos("reacher_hard", "demos/reacher_hard", episodes=200)
     bootifol.train("reacher_hard", "demos/reacher_hard", "runs/first", preset="cpu")
     print(bootifol.evaluate("runs/first", episodes=10).scaled_return)
+    policy = bootifol.load_policy("runs/first")  # policy.reset(), then policy.act(picture) once an agent step
     rewards = bootifol.score("runs/first", ["my_video.mp4"])
     bootifol.report(["runs/first"], "report.html")
 """
@@ -18,6 +19,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from bootifol.agents.policy import Policy as Policy
     from bootifol.demos.export_videos import export_videos as export_videos
     from bootifol.demos.import_videos import import_videos as import_videos
     from bootifol.demos.record import record_demos as record_demos
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from bootifol.training.api import evaluate_run as evaluate
     from bootifol.training.api import score_videos as score
     from bootifol.training.api import train_policy as train
+    from bootifol.training.saved_policy import load_policy as load_policy
 
 __version__ = version("bootifol")
 
@@ -35,6 +38,7 @@ _WHERE = {
     "export_videos": ("bootifol.demos.export_videos", "export_videos"),
     "import_videos": ("bootifol.demos.import_videos", "import_videos"),
     "record_demos": ("bootifol.demos.record", "record_demos"),
+    "Policy": ("bootifol.agents.policy", "Policy"),
     "BootifolError": ("bootifol.errors", "BootifolError"),
     "report": ("bootifol.reports.html", "report"),
     "table": ("bootifol.reports.table_files", "table"),
@@ -42,14 +46,17 @@ _WHERE = {
     "evaluate": ("bootifol.training.api", "evaluate_run"),
     "score": ("bootifol.training.api", "score_videos"),
     "train": ("bootifol.training.api", "train_policy"),
+    "load_policy": ("bootifol.training.saved_policy", "load_policy"),
 }
 """Module and name of each public function, imported when first used: `bootifol --help` must not wait for PyTorch."""
 
 __all__ = [
     "BootifolError",
+    "Policy",
     "evaluate",
     "export_videos",
     "import_videos",
+    "load_policy",
     "record_demos",
     "report",
     "resume",

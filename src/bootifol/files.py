@@ -6,13 +6,13 @@ import json
 import os
 import shutil
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError
+from safetensors import SafetensorError, safe_open
 from safetensors.numpy import load_file, save_file
 
 from bootifol.errors import BootifolError
@@ -79,11 +79,12 @@ def read_json(path: Path, what: str) -> Any:
         raise BootifolError(f"{what} cannot be read: {path}: {error}") from error
 
 
-def write_arrays(target: Path, arrays: Arrays) -> None:
-    """Writes named arrays as one safetensors file."""
+def write_arrays(target: Path, arrays: Arrays, texts: Mapping[str, str] | None = None) -> None:
+    """Writes named arrays as one safetensors file, with named texts in its header."""
     with written_aside(target) as aside:
         # Not np.ascontiguousarray, which gives numbers without a dimension one.
-        save_file({name: np.asarray(array, order="C") for name, array in arrays.items()}, aside)
+        contiguous = {name: np.asarray(array, order="C") for name, array in arrays.items()}
+        save_file(contiguous, aside, None if texts is None else dict(texts))
 
 
 def read_arrays(path: Path, what: str) -> Arrays:
@@ -92,8 +93,24 @@ def read_arrays(path: Path, what: str) -> Arrays:
     Raises:
         BootifolError: the file is missing, truncated or damaged.
     """
-    try:
+    with _read_errors(path, what):
         return dict(load_file(path))
+
+
+def read_texts(path: Path, what: str) -> dict[str, str]:
+    """Reads the texts in the header of a safetensors file; empty where there are none.
+
+    Raises:
+        BootifolError: as `read_arrays`.
+    """
+    with _read_errors(path, what), safe_open(path, framework="numpy") as file:
+        return dict(file.metadata() or {})
+
+
+@contextmanager
+def _read_errors(path: Path, what: str) -> Iterator[None]:
+    try:
+        yield
     except FileNotFoundError:
         raise BootifolError(f"{what} is missing: there is no {path}") from None
     except (OSError, SafetensorError, ValueError) as error:

@@ -49,6 +49,7 @@ def test_a_run_leaves_everything_it_promises(run: Path) -> None:
     names = {path.name for path in run.iterdir()}
     assert names >= {
         *("config.json", "metrics.jsonl", "evaluations.csv", "ranking.csv", "showcase.safetensors"),
+        "policy.safetensors",
         *("checkpoints", "videos", "report.html"),
     }
     rows = list(csv.DictReader((run / "evaluations.csv").open()))

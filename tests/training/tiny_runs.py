@@ -75,6 +75,13 @@ ENCODING_BASED = replace(
 )
 """The same, with an agent that sees the reward model's encodings instead of pictures."""
 
+ENDS_SOON = replace(
+    TINY,
+    agent=replace(TINY.agent, averaging=0.9, warm_up_steps=30),
+    interactive=replace(TINY.interactive, agent_steps=90),
+)
+"""A policy with averaged networks after a few updates."""
+
 RUNS = [
     pytest.param("bootifol", TINY, id="paper"),
     pytest.param("bootifol", ENCODING_BASED, id="encoding_based"),

@@ -19,7 +19,7 @@ from torch import Tensor, nn
 from bootifol.agents.config import DrQv2Config
 from bootifol.agents.encodings import FrameEncodings
 from bootifol.agents.gradient_step import take_step
-from bootifol.agents.networks import Actor, Critic, Encoder, EncodingEncoder, initialize
+from bootifol.agents.networks import Actor, Critic, Encoder, EncodingEncoder, as_batch, initialize
 from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
 from bootifol.types import Action, Arrays, Batch, Observation, StepMetrics
@@ -145,6 +145,11 @@ class DrQv2:
             )
         return encoder
 
+    @property
+    def acting(self) -> tuple[Encoder | EncodingEncoder, Actor]:
+        """The networks that act without exploration: the averaged ones where there are any, else the newest."""
+        return (self.encoder, self.actor) if self._averaged is None else self._averaged
+
     def act(self, observation: Observation, agent_steps: float, explore: bool) -> Action:
         """One action.
 
@@ -157,10 +162,8 @@ class DrQv2:
             float32 `[A]` in [-1, 1].
         """
         with torch.inference_mode():
-            picture = torch.from_numpy(observation).permute(2, 0, 1).unsqueeze(0)
-            newest = self.encoder, self.actor
-            encoder, actor = newest if explore or self._averaged is None else self._averaged
-            mean = actor(encoder(self._network_input(picture, torch.float32)))
+            encoder, actor = (self.encoder, self.actor) if explore else self.acting
+            mean = actor(encoder(self._network_input(as_batch(observation), torch.float32)))
             if explore:
                 mean = noisy_action(mean, self.config.exploration(agent_steps), None, self._generator)
             action: Action = to_host(mean[0])  # which the environment waits for

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from bootifol.agents.config import EncoderName
+from bootifol.types import Observation
 
 _CONVOLUTIONS: dict[EncoderName, tuple[tuple[int, int, int], ...]] = {
     "paper": ((32, 3, 2), (32, 3, 1), (32, 3, 1), (32, 3, 1)),
@@ -137,6 +138,11 @@ class Critic(nn.Module):
         """Q of actions `[B, A]` given the trunk's output `[B, feature_dim]`."""
         inputs = torch.cat([trunk, action.to(trunk.dtype)], dim=1)
         return self.q1(inputs).squeeze(1), self.q2(inputs).squeeze(1)
+
+
+def as_batch(observation: Observation) -> Tensor:
+    """An observation uint8 `[S, S, 3 * stack]` as a batch of one, `[1, 3 * stack, S, S]`, sharing its memory."""
+    return torch.from_numpy(observation).permute(2, 0, 1).unsqueeze(0)
 
 
 def initialize(network: nn.Module, generator: torch.Generator) -> None:

@@ -21,6 +21,7 @@ from bootifol.demos.features import FeaturizedVideos, without_pixels
 from bootifol.demos.manifest import read_manifest
 from bootifol.demos.record import record
 from bootifol.devices import chosen_device
+from bootifol.envs.pixels import PixelEnvironment
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import KINDS
 from bootifol.networks.backbones import Backbone
@@ -73,7 +74,7 @@ class Components:
         return parts if self.demonstrations is None else {**parts, "demonstrations": self.demonstrations}
 
 
-def build_environment(run: RunConfig, episode_steps: int) -> gymnasium.Env[Any, Any]:
+def build_environment(run: RunConfig, episode_steps: int) -> PixelEnvironment:
     """An environment of the run's task that shows it as the run's configuration says."""
     return make_environment(run.task, run.training.pictures, episode_steps, run.training.action_repeat)
 

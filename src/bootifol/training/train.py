@@ -46,6 +46,7 @@ from bootifol.training.components import build_components, build_environment, op
 from bootifol.training.interactive import InteractivePhase, evaluation_seeds
 from bootifol.training.interruption import Interruption
 from bootifol.training.run_config import RunConfig
+from bootifol.training.saved_policy import save_policy
 from bootifol.types import Action, Metrics, Observation, Video
 
 
@@ -375,6 +376,9 @@ class Run:
             self.directory / "checkpoints",
             Progress(self.counters, dict(self.rng.bit_generator.state), self._metrics_bytes),
             self.components.stateful(),
+        )
+        save_policy(
+            self.directory, self.run, self.environment, self.components.agent, self.counters.agent_steps
         )
         self._saved_at = time.monotonic()
 

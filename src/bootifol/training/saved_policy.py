@@ -1,0 +1,102 @@
+"""What a run leaves to act with: its policy in a file of its own, and in its newest checkpoint."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from bootifol.agents.drqv2 import DrQv2
+from bootifol.agents.policy import Policy, PolicyConfig, read_policy, write_policy
+from bootifol.envs.pixels import PixelEnvironment
+from bootifol.errors import BootifolError
+from bootifol.training.checkpoint import Progress, load_checkpoint, newest_checkpoint
+from bootifol.training.components import build_agent, build_environment, build_reward_model, sees_encodings
+from bootifol.training.run_config import RunConfig
+
+NAME = "policy.safetensors"
+
+
+def load_policy(run: Path | str) -> Policy:
+    """A run's newest policy, to act with outside of this library; it computes on the CPU.
+
+    A run that acts on encodings, or was written before runs had a `policy.safetensors`, is read from its newest
+    checkpoint, which needs the environment's packages.
+
+    Args:
+        run: the run's directory, or its `policy.safetensors` alone, wherever it was copied to.
+
+    Returns:
+        A policy whose actions are bit for bit those of `evaluate` on the CPU.
+
+    Raises:
+        BootifolError: there is no run, it has no checkpoint yet, or a file is damaged.
+    """
+    path = Path(run)
+    file = path / NAME if path.is_dir() else path
+    if file.is_file():
+        return read_policy(file)
+    config = RunConfig.read(path)
+    config = replace(config, training=replace(config.training, device="cpu"))
+    environment = build_environment(config, episode_steps=1)
+    try:
+        agent, progress = restored_agent(config, path, environment)
+        return Policy(
+            lambda observation: agent.act(observation, 0, explore=False),
+            _policy_config(config, environment, progress.counters.agent_steps),
+        )
+    finally:
+        environment.close()
+
+
+def save_policy(
+    directory: Path, run: RunConfig, environment: PixelEnvironment, agent: DrQv2, agent_steps: int
+) -> None:
+    """Writes a run's policy, unless it acts on encodings, for which it needs the whole reward model.
+
+    Args:
+        directory: of the run.
+        run: its configuration.
+        environment: that it acts in.
+        agent: that it trains.
+        agent_steps: of training so far.
+    """
+    if not sees_encodings(run):
+        write_policy(directory / NAME, _policy_config(run, environment, agent_steps), agent)
+
+
+def restored_agent(run: RunConfig, directory: Path, environment: PixelEnvironment) -> tuple[DrQv2, Progress]:
+    """The agent of a run's newest checkpoint, and how far it was.
+
+    Raises:
+        BootifolError: there is no checkpoint, or it is damaged or does not fit.
+    """
+    checkpoint = require_checkpoint(directory)
+    # Others act without it, so a backbone or a module of one's own may be missing.
+    reward_model = build_reward_model(run) if sees_encodings(run) else None
+    if reward_model is not None:
+        load_checkpoint(checkpoint, {"reward_model": reward_model})
+    agent = build_agent(run, environment, reward_model)
+    return agent, load_checkpoint(checkpoint, {"agent": agent})
+
+
+def require_checkpoint(directory: Path) -> Path:
+    """A run's newest checkpoint.
+
+    Raises:
+        BootifolError: there is none.
+    """
+    checkpoint = newest_checkpoint(directory / "checkpoints")
+    if checkpoint is None:
+        raise BootifolError(f"{directory} has no checkpoint yet: let `bootifol train` write one first")
+    return checkpoint
+
+
+def _policy_config(run: RunConfig, environment: PixelEnvironment, agent_steps: int) -> PolicyConfig:
+    return PolicyConfig(
+        task=run.task,
+        agent_steps=agent_steps,
+        action_dim=environment.simulator.action_dim,
+        action_repeat=environment.action_repeat,
+        frames_per_second=environment.metadata["render_fps"],
+        pictures=run.training.pictures,
+    )
