@@ -91,6 +91,11 @@ class Episode:
     def agent_steps(self) -> int:
         return len(self.actions)
 
+    @property
+    def largest_frames(self) -> Frames:
+        """At the larger of both sizes, for people to look at."""
+        return max(self.frames, self.video.frames, key=lambda frames: frames.shape[1])
+
 
 @dataclass(frozen=True)
 class Batch:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import gymnasium
 
 from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.pixels import PixelEnvironment
-from bootifol.envs.rollout import Act, play_episode
+from bootifol.envs.rollout import Act, PlayedEpisode, play_episode
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow
 from bootifol.experts import Behavior, make_behavior
@@ -32,7 +32,11 @@ class EpisodeResult:
 
 
 def evaluate(
-    environment: gymnasium.Env[Any, Any], act: Act, seeds: Sequence[int], name: str = "evaluation"
+    environment: gymnasium.Env[Any, Any],
+    act: Act,
+    seeds: Sequence[int],
+    name: str = "evaluation",
+    watch: Callable[[int, PlayedEpisode], None] = lambda episode, played: None,
 ) -> list[EpisodeResult]:
     """Plays one episode a seed, without exploration noise if `act` adds none.
 
@@ -41,10 +45,12 @@ def evaluate(
         act: the policy.
         seeds: one per episode; the same seeds give the same starts in any process.
         name: prefix of the episodes' names.
+        watch: called with each episode's number, from 0, and the episode.
     """
     results: list[EpisodeResult] = []
-    for seed in seeds:
+    for episode, seed in enumerate(seeds):
         played = play_episode(environment, act, seed, f"{name}-{seed}")
+        watch(episode, played)
         results.append(EpisodeResult(seed, played.environment_return, played.success))
     return results
 

@@ -73,13 +73,12 @@ def play_showcase(
                 f"showcase-{agent_steps}-{kind}-{start}",
                 keep_environment_rewards=model.reads_environment_reward,
             )
-            seen, watched = played.episode.frames, played.episode.video.frames
             episodes.append(
                 ShowcaseEpisode(
                     kind=kind,
                     start=start,
                     seed=seed,
-                    frames=seen if seen.shape[1] > watched.shape[1] else watched,
+                    frames=played.episode.largest_frames,
                     rewards=np.asarray(model.label(played.episode.video, references), dtype=np.float32),
                     environment_return=played.environment_return,
                 )

@@ -1,4 +1,4 @@
-"""The result tables of a run, `evaluations.csv` and `ranking.csv`: their columns, writing and reading.
+"""The result tables of a run, `evaluations.csv` and `ranking.csv`, and the one of `bootifol evaluate --out`.
 
 Every write leaves a whole file (written aside, then renamed). Rows measured again at the same agent steps
 replace the old ones, so a run that resumes from a checkpoint repeats its evaluations without doubling them.
@@ -47,6 +47,14 @@ class EvaluationRow:
 
 
 @dataclass(frozen=True)
+class PlayedRow(EvaluationRow):
+    """One episode that `bootifol evaluate` played."""
+
+    run: str
+    """Directory of the run, as it was named."""
+
+
+@dataclass(frozen=True)
 class RankingRow:
     """The learned reward of one video."""
 
@@ -80,14 +88,19 @@ def append_evaluations(path: Path, rows: Sequence[EvaluationRow]) -> None:
     replaced = {(row.agent_steps, row.episode_steps) for row in rows}
     earlier = _rows_so_far(path, EvaluationRow)
     kept = [row for row in earlier if (row.agent_steps, row.episode_steps) not in replaced]
-    _write(path, EvaluationRow, [*kept, *rows])
+    _write(path, EvaluationRow, _sorted([*kept, *rows]))
 
 
 def append_ranking(path: Path, rows: Sequence[RankingRow]) -> None:
     """Adds rows to `ranking.csv`; older rows of the same agent steps are replaced."""
     replaced = {row.agent_steps for row in rows}
     kept = [row for row in _rows_so_far(path, RankingRow) if row.agent_steps not in replaced]
-    _write(path, RankingRow, [*kept, *rows])
+    _write(path, RankingRow, _sorted([*kept, *rows]))
+
+
+def write_played(path: Path, rows: Sequence[PlayedRow]) -> None:
+    """Writes episodes of one run or several; an older file is replaced."""
+    _write(path, PlayedRow, rows)
 
 
 def drop_later_rows(run_dir: Path, agent_steps: int) -> None:
@@ -128,12 +141,16 @@ def _rows_so_far(path: Path, row_type: type[Row]) -> list[Row]:
     return _read(path, row_type).rows if path.exists() else []
 
 
+def _sorted(rows: Sequence[Row]) -> list[Row]:
+    """By agent steps: a re-measured evaluation takes the place of the one it replaces."""
+    return sorted(rows, key=lambda row: row.agent_steps)
+
+
 def _write(path: Path, row_type: type[Row], rows: Sequence[Row]) -> None:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([field.name for field in fields(row_type)])
-    # Sorted by agent steps: a re-measured evaluation takes the place of the one it replaces.
-    for row in sorted(rows, key=lambda row: row.agent_steps):
+    for row in rows:
         writer.writerow(["" if value is None else str(value) for value in astuple(row)])
     with written_aside(path) as aside:
         aside.write_text(text.getvalue())

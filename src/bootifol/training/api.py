@@ -12,27 +12,24 @@ from rich.console import Console
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.demos.import_videos import LARGEST_SQUARE, read_recordings
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
+from bootifol.demos.video_writing import write_video
+from bootifol.envs.rollout import PlayedEpisode
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import draw_references
-from bootifol.evaluation.returns import EpisodeResult, scaled_return
+from bootifol.evaluation.returns import EpisodeResult, evaluation_rows, scaled_return
 from bootifol.evaluation.returns import evaluate as evaluate_act
 from bootifol.evaluation.summary import Summary, summarize
+from bootifol.evaluation.tables import EvaluationRow
 from bootifol.files import written_aside
 from bootifol.presets import preset as preset_named
 from bootifol.reports.html import report
 from bootifol.rewards.registry import check_method
-from bootifol.training.checkpoint import load_checkpoint, newest_checkpoint
-from bootifol.training.components import (
-    build_agent,
-    build_environment,
-    build_reward_model,
-    open_demos,
-    reference_rng,
-    sees_encodings,
-)
+from bootifol.training.checkpoint import load_checkpoint
+from bootifol.training.components import build_environment, build_reward_model, open_demos, reference_rng
 from bootifol.training.config import TrainingConfig
 from bootifol.training.interactive import evaluation_seeds
 from bootifol.training.run_config import RunConfig
+from bootifol.training.saved_policy import require_checkpoint, restored_agent
 from bootifol.training.train import Run
 from bootifol.types import Rewards, Video
 
@@ -110,29 +107,57 @@ class RunEvaluation:
     scaled_return: float | None
     """0 for random actions, 1 for the expert; None where the task has no measured returns."""
     episode_steps: int
+    rows: list[EvaluationRow]
+    """The episodes as rows of a table."""
+
+    @property
+    def solved(self) -> int | None:
+        """In how many episodes the task was solved at any step; None where the environment does not say."""
+        told = [result.success for result in self.episodes if result.success is not None]
+        return sum(told) if told else None
 
 
-def evaluate_run(directory: Path | str, episodes: int = 10, seed: int = 1000) -> RunEvaluation:
-    """Plays a run's newest policy, without exploration, in episodes of the task's evaluation length."""
+def evaluate_run(
+    directory: Path | str, episodes: int = 10, seed: int = 1000, videos: Path | str | None = None
+) -> RunEvaluation:
+    """Plays a run's newest policy, without exploration, in episodes of the task's evaluation length.
+
+    Args:
+        directory: of the run.
+        episodes: how many, at least one.
+        seed: of the starts.
+        videos: directory to write each episode to as `episode-<number from 0>.mp4`; None writes none.
+
+    Raises:
+        BootifolError: there is no run, it has no checkpoint yet, or a file cannot be read or written.
+    """
     run = RunConfig.read(Path(directory))
     task = run.resolved_task()
     environment = build_environment(run, task.evaluation_steps)
-    checkpoint = _newest(Path(directory))
-    # Others act without it, so a backbone or a module of one's own may be missing.
-    reward_model = build_reward_model(run) if sees_encodings(run) else None
-    if reward_model is not None:
-        load_checkpoint(checkpoint, {"reward_model": reward_model})
-    agent = build_agent(run, environment, reward_model)
-    load_checkpoint(checkpoint, {"agent": agent})
+    agent, progress = restored_agent(run, Path(directory), environment)
+
+    def film(episode: int, played: PlayedEpisode) -> None:
+        if videos is not None:
+            target = Path(videos) / f"episode-{episode}.mp4"
+            write_video(target, played.episode.largest_frames, environment.metadata["render_fps"])
+
     results = evaluate_act(
         environment,
         lambda observation: agent.act(observation, run.training.interactive.agent_steps, explore=False),
         evaluation_seeds(seed, episodes),
+        watch=film,
     )
     environment.close()
     summary = summarize([result.environment_return for result in results])
-    scaled = scaled_return(summary.mean, expert_return=task.expert_return, random_return=task.random_return)
-    return RunEvaluation(results, summary, scaled, task.evaluation_steps)
+    levels = {"expert_return": task.expert_return, "random_return": task.random_return}
+    rows = evaluation_rows(
+        results,
+        agent_steps=progress.counters.agent_steps,
+        seconds=progress.counters.seconds,
+        episode_steps=task.evaluation_steps,
+        **levels,
+    )
+    return RunEvaluation(results, summary, scaled_return(summary.mean, **levels), task.evaluation_steps, rows)
 
 
 def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[str, Rewards]:
@@ -163,7 +188,7 @@ def scored_videos(directory: Path | str, videos: Sequence[Path | str]) -> Iterat
         raise BootifolError(
             f"{directory} was trained on the environment's reward: it has no reward for videos"
         )
-    load_checkpoint(_newest(Path(directory)), {"reward_model": model})
+    load_checkpoint(require_checkpoint(Path(directory)), {"reward_model": model})
     expert = open_demos(run, Console(stderr=True)).expert
     references = draw_references(model, expert, reference_rng(run.seed, 0))
     length = min((len(reference.frames) for reference in references), default=None)
@@ -215,10 +240,3 @@ def read_videos(path: Path, run: RunConfig) -> Iterator[Video]:
     chosen = None if crop == LARGEST_SQUARE else tuple(crop)
     for name, frames in read_recordings(path, size, expert.frames_per_second, camera, chosen):
         yield Video(name, frames)
-
-
-def _newest(directory: Path) -> Path:
-    checkpoint = newest_checkpoint(directory / "checkpoints")
-    if checkpoint is None:
-        raise BootifolError(f"{directory} has no checkpoint yet: let `bootifol train` write one first")
-    return checkpoint
