@@ -91,5 +91,5 @@ def test_updates_and_clones_train_the_mlp() -> None:
 def test_without_a_model_there_is_nothing_to_see() -> None:
     with pytest.raises(BootifolError, match=r"agent\.observations encodings needs a reward model"):
         DrQv2(CONFIG, SIZE, STACK, 2, seed=0)
-    with pytest.raises(BootifolError, match="observations must be one of pictures, encodings, not words"):
+    with pytest.raises(BootifolError, match="agent: observations is words; use pictures or encodings"):
         dataclasses.replace(CONFIG, observations="words")

@@ -1,4 +1,5 @@
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,6 +42,38 @@ def test_every_preset_rewards_videos_of_its_size_by_every_method(method: str, na
     expert, agent = DotVideos("expert", False, 10, size, 5), DotVideos("agent", True, 1, size, 5)
     rewards = model.label(agent[0], [expert[index] for index in range(model.reference_count)])
     assert rewards.shape == (4,) and np.isfinite(rewards).all()
+
+
+@pytest.mark.parametrize(
+    ("config", "field", "sentence"),
+    [
+        (BootifolConfig, {"reward": "cosin"}, "bootifol: reward is cosin; use distance or cosine"),
+        (BootifolConfig, {"aggregate": "max"}, "bootifol: aggregate is max; use mean or min or soft_min"),
+        (VirlConfig, {"distance": "cosine"}, "virl: distance is cosine; use euclidean or squared"),
+        (
+            ContextTranslationConfig,
+            {"reward_unit": "mean"},
+            "context translation: reward_unit is mean; use none",
+        ),
+        (GaifoConfig, {"precision": "fp16"}, "gaifo: precision is fp16; use fp32 or bf16"),
+        (
+            BootifolConfig,
+            {
+                f"{loss}_weight": 0.0
+                for loss in ("multiview", "triplet", "autoencoder", "prediction", "sequence")
+            },
+            "are all 0, so nothing would be learned",
+        ),
+        (
+            BootifolConfig,
+            {"backbone": "any", "triplet_weight": 0.0, "prediction_weight": 0.0, "sequence_weight": 0.0},
+            "bootifol: triplet_weight, prediction_weight, sequence_weight are all 0",
+        ),
+    ],
+)
+def test_a_choice_that_is_none_is_refused(config: Any, field: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(BootifolError, match=sentence):
+        config(**field)
 
 
 def test_the_command_line_offers_every_method() -> None:

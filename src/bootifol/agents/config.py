@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.errors import BootifolError, require_at_least, require_choices
 
 Precision = Literal["bf16", "fp32"]
 EncoderName = Literal["paper", "strided", "coarse"]
@@ -92,15 +92,7 @@ class DrQv2Config:
     """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""
 
     def __post_init__(self) -> None:
-        for name, choices in (
-            ("observations", get_args(Observations)),
-            ("encoder", get_args(EncoderName)),
-            ("precision", get_args(Precision)),
-        ):
-            if getattr(self, name) not in choices:
-                raise BootifolError(
-                    f"agent {name} must be one of {', '.join(choices)}, not {getattr(self, name)}"
-                )
+        require_choices("agent", self)
         at_least_one = (
             "feature_dim",
             "hidden_dim",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, require_choices
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,7 @@ class BootifolConfig:
     """bf16 computes the convolutions in bfloat16; parameters, LSTM, losses and Adam stay in float32."""
 
     def __post_init__(self) -> None:
+        require_choices("bootifol", self)
         for field in ("references", "sequence_times", "predicted_states", "window", "width_divisor"):
             if getattr(self, field) < 1:
                 raise BootifolError(f"bootifol: {field} is {getattr(self, field)}, but must be at least 1")
@@ -111,6 +112,13 @@ class BootifolConfig:
                 raise BootifolError(
                     f"bootifol: {field} is {getattr(self, field)}; use 0 to leave the loss out"
                 )
+        of_backbone = ("triplet", "prediction", "sequence")
+        learned = of_backbone if self.backbone else ("multiview", "autoencoder", *of_backbone)
+        if not any(getattr(self, f"{loss}_weight") for loss in learned):
+            raise BootifolError(
+                f"bootifol: {', '.join(f'{loss}_weight' for loss in learned)} are all 0, so nothing would be learned; "
+                "give one of them"
+            )
         if self.videos_per_class < 2:
             raise BootifolError(
                 f"bootifol: videos_per_class is {self.videos_per_class}, but L_O compares an expert video "

@@ -178,7 +178,6 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         anchors = self._indices(within + drawn.anchors)
         anchor_states = states[anchors]
         terms: dict[str, torch.Tensor] = {}
-        weights: dict[str, float] = {}
 
         half = states.shape[1] // 2
         if config.multiview_weight > 0 and not self.backbone:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, require_choices
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,7 @@ class ContextTranslationConfig:
     """bf16 computes the networks in bfloat16; parameters, losses, rewards and Adam stay in float32."""
 
     def __post_init__(self) -> None:
+        require_choices("context translation", self)
         for field in ("references", "pairs", "frames_per_pair", "width_divisor"):
             if getattr(self, field) < 1:
                 raise BootifolError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, require_choices
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ class GaifoConfig:
     """bf16 computes the network in bfloat16; parameters, losses and Adam stay in float32."""
 
     def __post_init__(self) -> None:
+        require_choices("gaifo", self)
         for field, least in (
             ("stack", 2),
             ("videos_per_class", 1),
@@ -54,9 +55,3 @@ class GaifoConfig:
             raise BootifolError(f"gaifo: leak is {self.leak}, but must be in [0, 1)")
         if not self.learning_rate > 0:
             raise BootifolError(f"gaifo: learning_rate is {self.learning_rate}, but must be above 0")
-        for field, choices in (
-            ("reward", ("softplus", "log_sigmoid", "logit")),
-            ("precision", ("fp32", "bf16")),
-        ):
-            if getattr(self, field) not in choices:
-                raise BootifolError(f"gaifo: {field} is {getattr(self, field)}; use {' or '.join(choices)}")

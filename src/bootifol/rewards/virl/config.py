@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, require_choices
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ class VirlConfig:
     """bf16 computes the convolutions in bfloat16; parameters, LSTMs, losses and Adam stay in float32."""
 
     def __post_init__(self) -> None:
+        require_choices("virl", self)
         for field in ("references", "width_divisor"):
             if not getattr(self, field) >= 1:
                 raise BootifolError(f"virl: {field} is {getattr(self, field)}, but must be at least 1")
