@@ -126,8 +126,8 @@ class TrainingConfig:
     """Where networks compute: auto (a CUDA GPU where PyTorch sees one, else the CPU), cpu, cuda, cuda:NUMBER, or mps on
     a Mac. None but the CPU has been tried."""
 
-    threads: int = 2
-    """Threads PyTorch computes with."""
+    threads: int = 1
+    """Threads PyTorch computes with; docs/performance.md says when more than one pays."""
 
     checkpoint_minutes: float = 20.0
     """Minutes between two checkpoints; one is also written at the end and when the run is interrupted."""
