@@ -22,11 +22,12 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.command import STOPPED, command
+from benchmarks.command import command
 from bootifol.cli.main import main as bootifol
 from bootifol.demos.video_writing import write_video
 from bootifol.envs.any_gymnasium import GymnasiumSimulator
 from bootifol.envs.pictures import PictureConfig
+from bootifol.errors import STOPPED
 from bootifol.progress import progress
 
 Controller = Callable[[Any], NDArray[np.float64]]
@@ -222,8 +223,6 @@ def main() -> None:
             *("--preset", arguments.preset, "--time-budget", arguments.time_budget),
             *("--threads", arguments.threads),
         )
-    if not (run / "report.html").exists():  # the last thing a run writes; Ctrl-C made it stop before
-        raise KeyboardInterrupt
     typed("evaluate", str(run), "--episodes", "10")
     typed("tasks", example.task, "--measure", "10")
 

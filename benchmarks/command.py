@@ -7,11 +7,9 @@ import sys
 from collections.abc import Callable
 from typing import ParamSpec
 
-from bootifol.errors import BootifolError
+from bootifol.errors import STOPPED, BootifolError
 
 BAD_INPUT = 2
-STOPPED = 130
-"""What shells give a program that Ctrl-C ended."""
 
 Words = ParamSpec("Words")
 

@@ -26,7 +26,7 @@ from statistics import mean
 from benchmarks.run_state import RunState, check_is_planned, error_file, keep, log_file, run_state
 from benchmarks.suites import RANDOM, VIDEOS, PlannedRun, demos_of
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
-from bootifol.errors import BootifolError
+from bootifol.errors import STOPPED, BootifolError
 from bootifol.files import written_aside
 from bootifol.progress import duration
 from bootifol.training.budget import parse_duration
@@ -255,15 +255,16 @@ class RunQueue:
         directory = self.directory(ended.run)
         state = run_state(directory)
         self._keep(ended.run)
-        error = what_went_wrong(ended.process.returncode, log_file(directory), ended.log_begins)
+        code = ended.process.returncode
         if state.state == "done":
             self.say(
                 f"{'done':10} {ended.run.name}: {state.agent_steps:,} agent steps in {duration(state.seconds)}"
             )
-        elif self._stopping or not error:
+        elif self._stopping or code in (0, STOPPED):
             self.say(f"{'stopped':10} {ended.run.name}: the same command goes on with it")
         else:
-            self._fail(ended.run, error, log_file(directory))
+            log = log_file(directory)
+            self._fail(ended.run, what_went_wrong(code, log, ended.log_begins), log)
 
     def _keep(self, run: PlannedRun) -> None:
         """Copies the results of a run that is done in its own directory, if there are to be copies."""

@@ -156,7 +156,7 @@ def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
 
     with monkeypatch.context() as patch:
         patch.setattr(InteractivePhase, "play_episode", play_and_stop)
-        assert main(["train", *TINY, "--method", METHOD, "--out", "parts"]) == 0
+        assert main(["train", *TINY, "--method", METHOD, "--out", "parts"]) == 130
     assert not (home / "parts" / "report.html").exists()
     assert main(["train", "--resume", "parts"]) == 0
     whole, parts = (trained(home / name).state() for name in ("run", "parts"))

@@ -25,7 +25,8 @@ def test_the_readmes_lines_run(tmp_path: Path) -> None:
         tensorboard=False,
     )
     bootifol.record_demos("drawn_reach", tmp_path / "demos", episodes=12, pictures=pictures)
-    bootifol.train("drawn_reach", tmp_path / "demos", tmp_path / "run", preset="smoke", config=config)
+    run = bootifol.train("drawn_reach", tmp_path / "demos", tmp_path / "run", preset="smoke", config=config)
+    assert (run.directory, run.finished) == (tmp_path / "run", True)
     assert isinstance(bootifol.evaluate(tmp_path / "run", episodes=1).scaled_return, float)
     rewards = bootifol.score(tmp_path / "run", [tmp_path / "demos" / "expert"])
     assert len(rewards) == 12

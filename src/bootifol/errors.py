@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import typing
 
+STOPPED = 130
+"""Exit code of a command that was asked to stop before its end, as shells give it after Ctrl-C."""
+
 
 class BootifolError(Exception):
     """What was wrong, where, and what to do, in one sentence.

@@ -42,6 +42,8 @@ def main(words: list[str]) -> int:
     if method == "gaifo":
         print("a line before\nerror: the loss is nan\n", file=sys.stderr)
         return 2
+    if method == "context_translation" and not resumes:
+        return 130  # somebody asked it alone to stop
     if method == "virl" and not resumes:
         return interrupted_twice() if os.environ.get("FAKE_CTRL_C") == "twice" else interrupted_once(out)
     write_end(out, 12.5)
@@ -80,7 +82,7 @@ def interrupted_once(out: Path) -> int:
     os.kill(os.getppid(), signal.SIGINT)
     while not (out / "checkpoints").exists():
         time.sleep(0.01)
-    return 0
+    return 130
 
 
 def interrupted_twice() -> int:

@@ -91,6 +91,14 @@ def test_ctrl_c_lets_runs_write_checkpoints_and_the_same_command_goes_on(suite: 
     assert calls(suite)[1:] == ["train virl/seed1", "resume virl/seed1", "train bootifol/seed1"]
 
 
+def test_a_run_that_is_stopped_alone_did_not_fail_and_stops_no_other(suite: Path) -> None:
+    runs, lines = planned("context_translation", "bootifol"), []
+    assert str(queue(suite, runs, lines=lines).work()) == "1 done, 0 failed, 1 left"
+    assert "stopped    drawn_home/context_translation/seed1: the same command goes on with it" in lines
+    assert queue(suite, runs).work().done == 2
+    assert calls(suite)[-1] == "resume context_translation/seed1"
+
+
 def test_a_second_ctrl_c_ends_runs_at_once(suite: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FAKE_CTRL_C", "twice")
     with pytest.raises(KeyboardInterrupt):

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import tyro
 
 from bootifol.demos.manifest import Manifest
-from bootifol.errors import BootifolError
+from bootifol.errors import STOPPED, BootifolError
 
 
 def record(
@@ -59,7 +59,7 @@ def record(
             print(f"{out / behavior}: {_summary(demo_set.manifest)}")
     except KeyboardInterrupt:
         print("\nstopped; run the same command again and it goes on where it stopped")
-        return 130
+        return STOPPED
     if "half_good" in (behaviors or ()) and "half_good" not in recorded:
         print(f"half_good videos were left out: no expert is bundled for {task} to be half as good as")
     before = f"demos check {out}" if "expert" in recorded else f"demos import YOUR_VIDEOS --out {out}"

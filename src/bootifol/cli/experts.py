@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from bootifol.errors import STOPPED
+
 
 def train(
     task: str,
@@ -68,6 +70,6 @@ def train(
         train_expert(config, out, start_from)
     except KeyboardInterrupt:
         print("\nstopped; run the same command again and it goes on from its last evaluation")
-        return 130
+        return STOPPED
     print(f"{out / 'expert.safetensors'}: the best policy of those in {out / 'curve.csv'}")
     return 0

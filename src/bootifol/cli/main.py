@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import tyro
 from rich.console import Console
 
-from bootifol.errors import BootifolError
+from bootifol.errors import STOPPED, BootifolError
 
 DESCRIPTION = """Videos in, policy out: learns a reward from videos of a task, and trains a pixel policy on it.
 
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; the process's own by default.
 
     Returns:
-        The exit code: 0, or 2 after bad input, which one sentence explains.
+        The exit code: 0, 2 after bad input, which one sentence explains, or 130 after an interruption.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         Console(stderr=True).print("stopped")
-        return 130
+        return STOPPED
     except BrokenPipeError:
         # The reader of our output has gone, as `| head` does.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

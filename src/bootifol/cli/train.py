@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from bootifol.errors import BootifolError
+from bootifol.errors import STOPPED, BootifolError
 from bootifol.presets import PresetName, preset
 from bootifol.tasks import short_name
 from bootifol.training.config import TrainingConfig
@@ -36,6 +36,8 @@ def train(
 ) -> int:
     """Learn a reward from videos and train a policy on it, or go on with an interrupted run.
 
+    Ctrl-C writes a checkpoint and exits with 130; `--resume` goes on from there.
+
     Args:
         config: Every setting of the preset, which the flags below change one by one.
         task: The environment to act in: a name that `bootifol tasks` lists, gymnasium:ID, or MODULE:FUNCTION, which
@@ -57,8 +59,7 @@ def train(
     from bootifol.training.budget import parse_duration
 
     if resume is not None:
-        continue_run(resume)
-        return 0
+        return 0 if continue_run(resume) else STOPPED
     if demos is None or out is None:
         videos = (
             f"record videos with `bootifol demos record --task {task} --out demos/{task}`"
@@ -69,7 +70,7 @@ def train(
             "train needs --demos (the videos) and --out (where to write the run), or --resume RUN to go on; "
             + videos
         )
-    train_policy(
+    run = train_policy(
         task,
         demos,
         out,
@@ -80,4 +81,4 @@ def train(
         config=config,
         command=["bootifol", *sys.argv[1:]],
     )
-    return 0
+    return 0 if run.finished else STOPPED

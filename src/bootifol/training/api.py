@@ -34,6 +34,15 @@ from bootifol.training.train import Run
 from bootifol.types import Rewards, Video
 
 
+@dataclass(frozen=True)
+class TrainedRun:
+    """What `train_policy` leaves."""
+
+    directory: Path
+    finished: bool
+    """False if it was asked to stop before its end: `continue_run` goes on."""
+
+
 def train_policy(
     task: str,
     demos: Path | str,
@@ -45,8 +54,10 @@ def train_policy(
     time_budget: float | None = None,
     config: TrainingConfig | None = None,
     command: Sequence[str] = (),
-) -> Path:
+) -> TrainedRun:
     """Learns a reward from videos and trains a policy on it; writes the run's directory and its report.
+
+    Ctrl-C and SIGTERM make it write a checkpoint and return early, which the result says.
 
     Args:
         task: from the catalogue, or `gymnasium:ID`, or `module:function`.
@@ -61,7 +72,7 @@ def train_policy(
         command: what the user typed, for the report.
 
     Returns:
-        The run's directory.
+        The run's directory, and whether it came to its end.
 
     Raises:
         BootifolError: bad input, or an error that the run can be resumed from, which its sentence says.
@@ -83,8 +94,7 @@ def train_policy(
     )
     learner = Run(run, directory, console)
     run.write(directory, list(command))
-    _learn_and_report(learner)
-    return directory
+    return TrainedRun(directory, finished=_learn_and_report(learner))
 
 
 def continue_run(directory: Path | str) -> bool:
