@@ -30,9 +30,9 @@ from bootifol.training.run_config import RunConfig
 
 def play(
     config: Annotated[TrainingConfig, tyro.conf.arg(name="")],
+    task: str,
     demos: Path,
     out: Path,
-    task: str = "reacher_hard",
     method: str = "random",
     preset: str = "cpu",
     seed: int = 1,

@@ -86,7 +86,7 @@ def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
         "doctor": doctor,
         "tasks": tasks,
         "demos": _demos_placeholder,
-        "train": functools.partial(train, config=preset_of(words)),
+        "train": functools.partial(train, config=preset_of(words), words=tuple(words)),
         "evaluate": evaluate,
         "score": score,
         "report": report,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -23,9 +24,14 @@ def preset_of(words: list[str]) -> TrainingConfig:
     return preset("cpu")
 
 
+def flags_of(words: Sequence[str]) -> list[str]:
+    """The flags among the words of a command, each once, without their values."""
+    return list(dict.fromkeys(word.partition("=")[0] for word in words if word.startswith("--")))
+
+
 def train(
     config: Annotated[TrainingConfig, tyro.conf.arg(name="")],
-    task: str = "reacher_hard",
+    task: str | None = None,
     method: str = "bootifol",
     preset: PresetName = "cpu",
     demos: Path | None = None,
@@ -33,6 +39,7 @@ def train(
     seed: int = 1,
     time_budget: str | None = None,
     resume: Path | None = None,
+    words: Annotated[tuple[str, ...], tyro.conf.Fixed, tyro.conf.Suppress] = (),
 ) -> int:
     """Learn a reward from videos and train a policy on it, or go on with an interrupted run.
 
@@ -41,7 +48,7 @@ def train(
     Args:
         config: Every setting of the preset, which the flags below change one by one.
         task: The environment to act in: a name that `bootifol tasks` lists, gymnasium:ID, or MODULE:FUNCTION, which
-            returns a Gymnasium environment.
+            returns a Gymnasium environment. By default the one that the videos were recorded in.
         method: bootifol, virl, context_translation and gaifo learn a reward from the videos; environment uses the true
             reward, as an upper bound. MODULE:NAME is a method of your own (docs/add_a_method.md).
         preset: paper: its hyperparameters to the digit. cpu: one to two hours on one core. demo: what `make demo` runs,
@@ -52,33 +59,63 @@ def train(
         seed: Of everything random.
         time_budget: Wall-clock time for learning, such as 90s, 45m or 1h30m; schedules are stretched to fit it.
             The final evaluation and the report come after it.
-        resume: Directory of an interrupted run to go on with; its own configuration is used.
+        resume: Directory of an interrupted run to go on with; its own configuration is used, and no other flag allowed.
+        words: What was typed.
     """
     # Imported here: help should not wait for PyTorch.
     from bootifol.training.api import continue_run, train_policy
     from bootifol.training.budget import parse_duration
 
     if resume is not None:
+        if ignored := [flag for flag in flags_of(words) if flag != "--resume"]:
+            raise BootifolError(
+                f"--resume goes on with the configuration that {resume} was begun with and would ignore "
+                f"{', '.join(ignored)}: leave out all but --resume, or begin a new run with --demos and --out"
+            )
         return 0 if continue_run(resume) else STOPPED
     if demos is None or out is None:
+        name = task or "TASK"
         videos = (
-            f"record videos with `bootifol demos record --task {task} --out demos/{task}`"
-            if ":" not in task
-            else f"import videos with `bootifol demos import YOUR_VIDEOS --out demos/{short_name(task)}`"
+            f"record videos with `bootifol demos record --task {name} --out demos/{name}`"
+            if ":" not in name
+            else f"import videos with `bootifol demos import YOUR_VIDEOS --out demos/{short_name(name)}`"
         )
         raise BootifolError(
             "train needs --demos (the videos) and --out (where to write the run), or --resume RUN to go on; "
             + videos
         )
+    seconds = None if time_budget is None else parse_duration(time_budget)
     run = train_policy(
-        task,
+        task or _task_shown(demos),
         demos,
         out,
         method=method,
         preset=preset,
         seed=seed,
-        time_budget=None if time_budget is None else parse_duration(time_budget),
+        time_budget=seconds,
         config=config,
-        command=["bootifol", *sys.argv[1:]],
+        command=["bootifol", *words],
     )
     return 0 if run.finished else STOPPED
+
+
+def _task_shown(demos: Path) -> str:
+    """The task that recorded videos show; random ones beside imported ones tell it, too.
+
+    Raises:
+        BootifolError: nothing there was recorded, or more than one task was.
+    """
+    from bootifol.demos.demo_set import find_demo_sets
+    from bootifol.demos.manifest import read_manifest
+
+    manifests = map(read_manifest, find_demo_sets(demos).values())
+    tasks = {manifest.task for manifest in manifests if manifest.task is not None}
+    if len(tasks) != 1:
+        why = "show more than one task" if tasks else "were imported, so nothing says what they show"
+        raise BootifolError(
+            f"the videos in {demos} {why}: add --task NAME, with a name that `bootifol tasks` lists, gymnasium:ID, or "
+            "MODULE:FUNCTION"
+        )
+    (task,) = tasks
+    print(f"--task {task}: what the videos in {demos} show", file=sys.stderr)
+    return task
