@@ -252,6 +252,17 @@ def make_environment(
     return PixelEnvironment(task.make_simulator(pictures), pictures, task.action_repeat, episode_steps)
 
 
+def frames_per_second(task: Task) -> float | None:
+    """Pictures a second of the task's episodes; None where its environment does not say how fast time passes.
+
+    Raises:
+        BootifolError: its environment cannot be made on this machine.
+    """
+    environment = make_environment(task.name, PictureConfig(), task.episode_steps, task.action_repeat)
+    environment.close()
+    return environment.metadata["render_fps"] if environment.knows_time else None
+
+
 def short_name(task_name: str) -> str:
     """A task's name for files and titles: Pendulum-v1 of gymnasium:Pendulum-v1, my_robot.make of my_robot:make."""
     return task_name.removeprefix("gymnasium:").replace(":", ".")

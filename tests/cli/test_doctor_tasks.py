@@ -13,6 +13,7 @@ from bootifol.cli import doctor as doctor_command
 from bootifol.cli.main import main
 from bootifol.envs import camera
 from bootifol.envs.drawn import DrawnReach
+from bootifol.errors import BootifolError
 from bootifol.tasks import TASKS
 
 
@@ -167,3 +168,30 @@ def test_tasks_refuses_a_negative_number_of_episodes(capsys: pytest.CaptureFixtu
     assert "--measure is a number of episodes, not -1" in capsys.readouterr().err
     assert main(["tasks", "juggling"]) == 2
     assert "there is no task 'juggling'" in capsys.readouterr().err
+
+
+def test_tasks_says_how_to_import_videos_of_a_task(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["tasks", "drawn_home"]) == 0
+    command = "bootifol demos import VIDEOS --fps 10 --frames 31 --out demos/drawn_home"
+    assert capsys.readouterr().out.splitlines()[-1] == f"import your videos with: {command}"
+    assert main(["tasks"]) == 0
+    assert "import your videos" not in capsys.readouterr().out
+
+    def no_rendering(*_: object) -> None:
+        raise BootifolError("install OpenGL")
+
+    monkeypatch.setattr(catalogue, "make_environment", no_rendering)
+    assert main(["tasks", "drawn_home"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last == "pictures a second of drawn_home are not known here: install OpenGL"
+
+
+def test_pictures_a_second_are_unknown_where_an_environment_keeps_no_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    task = TASKS["drawn_home"]
+    assert catalogue.frames_per_second(task) == 10
+    monkeypatch.setattr(DrawnReach, "knows_time", False, raising=False)
+    assert catalogue.frames_per_second(task) is None

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bootifol.errors import BootifolError
-from bootifol.tasks import TASKS, Task, task_named
+from bootifol.tasks import TASKS, Task, frames_per_second, short_name, task_named
 
 
 def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure: int = 0) -> int:
@@ -54,7 +54,22 @@ def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure:
         )
     if measure:
         console.print(_measured(listed, measure))
+    for task in listed if names else []:
+        console.print(_how_to_import(task), soft_wrap=True, highlight=False)
     return 0
+
+
+def _how_to_import(task: Task) -> str:
+    """The command that brings one's own videos to the task's pace and length."""
+    try:
+        rate = frames_per_second(task)
+    except BootifolError as error:  # the catalogue is for every machine, also for one that cannot render
+        return f"pictures a second of {task.name} are not known here: {error}"
+    fps = "" if rate is None else f"--fps {rate:g} "
+    shape = f"{fps}--frames {task.episode_steps + 1}"
+    return (
+        f"import your videos with: bootifol demos import VIDEOS {shape} --out demos/{short_name(task.name)}"
+    )
 
 
 def _table(*headings: str) -> Table:
