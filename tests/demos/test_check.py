@@ -125,9 +125,26 @@ def test_fitting_videos_differ_in_nothing(fitting: Manifest) -> None:
             {"frames": 30},
             "30 frames and an episode of drawn_reach has 31: record them again with --episode-steps 30",
         ),
-        ({"video_size": 16}, "16×16 pixels and the run reads 8×8: pass --pictures.video-size 16"),
-        ({"render_profile": "full"}, "pass --pictures.profile full"),
-        ({"agent_size": 16}, "rendered at 16 pixels and the run renders at 8"),
+        (
+            {"video_size": 16, "render_profile": "full"},
+            "are 16×16 pixels where the run reads 8×8, and rendered with profile full where the run renders with fast: "
+            "pass --pictures.video-size 16 --pictures.profile full, or record them again with "
+            "--video-size 8 --agent-size 8 --profile fast",
+        ),
+        (
+            {"agent_size": 16},
+            "rendered at 16 pixels where the run renders at 8: pass --pictures.agent-size 16, or "
+            "record them again with --video-size 8 --agent-size 8 --profile fast",
+        ),
+        (
+            IMPORTED | {"video_size": 4},
+            "4×4 pixels where the run reads 8×8: pass --pictures.video-size 4 --pictures.agent-size 4, or import them "
+            "again with --size 8",
+        ),
+        (
+            IMPORTED | {"video_size": 16},
+            "pass --pictures.video-size 16, or",
+        ),
         (IMPORTED | {"frames": 30}, "import them again with --frames 31"),
         (IMPORTED | {"frames_per_second": 25.0}, "25 pictures a second and drawn_reach shows 10"),
     ],

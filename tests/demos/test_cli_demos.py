@@ -5,8 +5,11 @@ import pytest
 import tyro
 
 from bootifol.cli import demos
+from bootifol.cli.main import main
 from bootifol.demos import record as recording
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.manifest import Manifest
+from bootifol.demos.video_writing import write_video
 from bootifol.errors import BootifolError
 
 
@@ -27,6 +30,8 @@ def test_record_writes_one_set_a_behavior_and_check_approves(
     assert printed.count("every checksum agrees") == 3
     assert printed.count("fits the task drawn_reach") == 3
     assert "3 videos of 31 frames" in printed
+    train = f"train --task drawn_reach --preset drawn --demos {tmp_path / 'demos'} --out runs/drawn_reach"
+    assert f"then bootifol {train} --pictures.video-size 16 --pictures.agent-size 16\n" in printed
 
 
 def test_check_of_another_task_says_what_to_do_and_exits_with_1(
@@ -72,10 +77,47 @@ def test_import_takes_a_folder_of_videos(tmp_path: Path, capsys: pytest.CaptureF
     printed = capsys.readouterr().out
     assert "3 videos of 9 frames, 16×16 pixels, from 3 files" in printed
     assert "3 shorter than 9 frames" in printed
+    assert "--out runs/TASK --pictures.video-size 16 --pictures.agent-size 16\n" in printed
     assert tyro.cli(demos.check, args=[str(out), "--task", "drawn_reach"]) == 1
     printed = capsys.readouterr().out
     assert "import them again with --frames 31" in printed
     assert "nothing moves in demos-expert-000000" in printed
+
+
+def test_import_for_a_task_takes_its_pace_and_length(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frames = np.random.default_rng(1).integers(0, 255, (61, 16, 16, 3), np.uint8)
+    write_video(tmp_path / "film.mp4", frames, 20.0)
+
+    def imported(out: str, *more: str) -> Manifest:
+        words = [str(tmp_path / "film.mp4"), "--out", str(tmp_path / out), "--size", "16", *more]
+        assert main(["demos", "import", *words]) == 0
+        return DemoSet.open(tmp_path / out / "expert").manifest
+
+    found = imported("a", "--task", "drawn_home")
+    assert (found.frames, found.frames_per_second, len(found.videos)) == (31, 10.0, 1)
+    printed = capsys.readouterr().out
+    assert (
+        f"check {tmp_path / 'a'} --task drawn_home, then bootifol train --task drawn_home --preset" in printed
+    )
+    found = imported("b", "--task", "drawn_home", "--action-repeat", "2")
+    assert (found.frames, found.frames_per_second) == (16, 5.0)
+    assert "--action-repeat 2, then" in capsys.readouterr().out
+    found = imported("c", "--task", "drawn_home", "--frames", "9", "--fps", "20")
+    assert (found.frames, found.frames_per_second) == (9, 20.0), "what is given goes before"
+    found = imported("d")
+    assert (found.frames, found.frames_per_second) == (61, 20.0)
+
+
+def test_import_refuses_what_a_task_cannot_tell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    np.save(tmp_path / "film.npy", np.zeros((9, 20, 20, 3), np.uint8))
+    words = ["demos", "import", str(tmp_path / "film.npy"), "--out", str(tmp_path / "out")]
+    assert main([*words, "--action-repeat", "2"]) == 2
+    assert "say of which with --task" in capsys.readouterr().err
+    assert main([*words, "--task", "drawn_home"]) == 2
+    assert "import it without --fps, and with --frames instead of --task" in capsys.readouterr().err
+    assert not (tmp_path / "out" / "expert").exists()
 
 
 def test_export_writes_what_import_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -46,7 +46,6 @@ def record(
     # Imported here: the simulators would slow down every other command's help.
     from bootifol.demos.record import record_demos
     from bootifol.envs.pictures import PictureConfig
-    from bootifol.tasks import short_name
 
     if behaviors == ():
         raise BootifolError("name at least one behavior, such as --behaviors expert random")
@@ -63,15 +62,17 @@ def record(
     if "half_good" in (behaviors or ()) and "half_good" not in recorded:
         print(f"half_good videos were left out: no expert is bundled for {task} to be half as good as")
     before = f"demos check {out}" if "expert" in recorded else f"demos import YOUR_VIDEOS --out {out}"
-    run = f"runs/{short_name(task)}"
-    print(f"next: bootifol {before}, then bootifol train --task {task} --demos {out} --out {run}")
+    manifest = next(iter(recorded.values())).manifest
+    print(f"next: bootifol {before}, then bootifol {_train_words(task, out, manifest)}")
     return 0
 
 
 def import_(
     videos: Annotated[list[Path], tyro.conf.Positional],
     out: Path,
-    frames: int = 61,
+    task: str | None = None,
+    action_repeat: int | None = None,
+    frames: int | None = None,
     size: int = 64,
     crop: tuple[int, int, int] | None = None,
     fps: float | None = None,
@@ -91,19 +92,34 @@ def import_(
     Args:
         videos: Files, and folders of them; a folder of pictures is one video.
         out: Directory of the demo sets, the one to give to `bootifol train --demos`.
-        frames: Frames of each video: the agent steps of the task's training episode, plus 1.
+        task: What the videos show; its environment says --fps and --frames, unless they are given.
+        action_repeat: Simulator steps an agent step, with --task, if training shall have others than the task's own.
+        frames: Frames of each video: the agent steps of the task's training episode, plus 1; 61 without --task.
         size: Height and width of the pictures, in pixels.
         crop: LEFT TOP SIDE: the square to cut out, in pixels of the upright picture.
-        fps: Pictures per second, which should be the environment's; by default every picture is kept.
+        fps: Pictures per second, which should be the environment's; without it and --task every picture is kept.
         windows: all cuts a long file into one video after another; first takes the beginning of each file.
         behavior: What the videos show.
         camera: Which camera of a LeRobot dataset to take, when it has several.
     """
     from bootifol.demos.import_videos import Conversion, import_videos
     from bootifol.demos.video_files import video_paths
+    from bootifol.tasks import frames_per_second, task_named
 
     files = video_paths(videos)
-    conversion = Conversion(frames=frames, size=size, crop=crop, frames_per_second=fps, windows=windows)
+    if task is not None:
+        shown = task_named(task, action_repeat)
+        frames = shown.episode_steps + 1 if frames is None else frames
+        fps = frames_per_second(shown) if fps is None else fps
+    elif action_repeat is not None:
+        raise BootifolError("--action-repeat changes the pace of a task: say of which with --task")
+    conversion = Conversion(
+        frames=Conversion.frames if frames is None else frames,
+        size=size,
+        crop=crop,
+        frames_per_second=fps,
+        windows=windows,
+    )
     demo_set = import_videos(files, out / behavior, conversion, behavior, camera=camera)
     manifest = demo_set.manifest
     short = sum(video.length < manifest.frames for video in manifest.videos)
@@ -111,9 +127,11 @@ def import_(
     what = "episode" if all("episode" in video.source for video in manifest.videos) else "file"
     print(f"{demo_set.path}: {_summary(manifest)}, from {_count(recordings, what)}")
     if short:
-        print(f"  {short} shorter than {frames} frames: they stand still on their last picture")
+        print(f"  {short} shorter than {manifest.frames} frames: they stand still on their last picture")
     print(f"  look at {demo_set.path / 'contact_sheet.png'}")
-    print(f"next: bootifol demos check {out} --task TASK, then bootifol train --task TASK --demos {out}")
+    train = _train_words(task or "TASK", out, manifest)
+    repeat = "" if action_repeat is None else f" --action-repeat {action_repeat}"
+    print(f"next: bootifol demos check {out} --task {task or 'TASK'}{repeat}, then bootifol {train}{repeat}")
     return 0
 
 
@@ -189,6 +207,18 @@ def export(
     count = export_videos(demos, out, format, behavior, fps, videos)
     print(f"{out}: {_count(count, 'video')} as {format}")
     return 0
+
+
+def _train_words(task: str, demos: Path, manifest: Manifest) -> str:
+    """What to type to learn from videos: with the preset for the task, and the pictures' flags where it needs them."""
+    from bootifol.demos.check import picture_flags
+    from bootifol.presets import preset
+    from bootifol.tasks import TASKS, short_name
+
+    drawn = task in TASKS and TASKS[task].suite == "drawn with numpy"
+    words = ["train", "--task", task, *(["--preset", "drawn"] if drawn else [])]
+    words += ["--demos", str(demos), "--out", f"runs/{short_name(task)}"]
+    return " ".join([*words, picture_flags(manifest, preset("drawn" if drawn else "cpu").pictures)]).rstrip()
 
 
 def _summary(manifest: Manifest) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from bootifol.demos.manifest import Manifest, VideoEntry
 from bootifol.demos.near_duplicates import near_duplicates
 from bootifol.envs.pictures import PictureConfig
 from bootifol.progress import progress
-from bootifol.tasks import Task, make_environment
+from bootifol.tasks import Task, frames_per_second
 
 LONG_STILLNESS = 0.5
 """Share of a video that may pass without motion before something moves. In recorded experts it is at most 0.2."""
@@ -122,7 +123,8 @@ def check_demo_set(path: Path, task: Task | None = None) -> CheckedSet:
     picture = None
     if task is not None and manifest.task in (None, task.name):
         videos = np.stack([video.first for video in looks])
-        environment = first_frames(task, _pictures_of(manifest))
+        pictures = PictureConfig()
+        environment = first_frames(task, replace(pictures, **_shown_like(manifest, pictures)))
         picture = write_first_frames(path, videos, environment)
         found += differences_of_looks(videos, environment, path / FIRST_FRAMES_NAME)
     return CheckedSet(
@@ -184,16 +186,6 @@ def _look_at_all(demo_set: DemoSet) -> list[Looks]:
     return looks
 
 
-def _pictures_of(manifest: Manifest) -> PictureConfig:
-    """How to show the environment so that it may look like these videos."""
-    default = PictureConfig()
-    return PictureConfig(
-        agent_size=manifest.agent_size or manifest.video_size,
-        video_size=manifest.video_size,
-        profile=manifest.render_profile or default.profile,  # type: ignore[arg-type]
-    )
-
-
 def _named(entries: Sequence[VideoEntry], indices: Sequence[int]) -> tuple[str, ...]:
     return tuple(_name(entries[index]) for index in indices)
 
@@ -251,14 +243,8 @@ def _differences_of_imported(manifest: Manifest, task: Task) -> list[str]:
             f"{_too_short(manifest, task)}: import them again with --frames {task.episode_steps + 1}, or pass "
             f"--episode-steps {manifest.frames - 1} here"
         )
-    environment = make_environment(task.name, PictureConfig(), task.episode_steps, task.action_repeat)
-    rate = environment.metadata["render_fps"]
-    environment.close()
-    if (
-        environment.knows_time
-        and manifest.frames_per_second
-        and abs(rate - manifest.frames_per_second) > 0.01 * rate
-    ):
+    rate = frames_per_second(task)
+    if rate and manifest.frames_per_second and abs(rate - manifest.frames_per_second) > 0.01 * rate:
         found.append(
             f"the videos show {manifest.frames_per_second:g} pictures a second and {task.name} shows {rate:g}, so "
             f"everything in them looks faster or slower: import them again with --fps {rate:g}"
@@ -269,23 +255,44 @@ def _differences_of_imported(manifest: Manifest, task: Task) -> list[str]:
 def _differences_of_pictures(manifest: Manifest, pictures: PictureConfig) -> list[str]:
     found = []
     size, profile = manifest.video_size, manifest.render_profile
-    if profile is not None and profile != pictures.profile:
-        found.append(
-            f"the videos were rendered with profile {profile} and the run renders with {pictures.profile}: "
-            f"pass --pictures.profile {profile}, or record the videos again with --profile {pictures.profile}"
-        )
+    rendered = max(manifest.agent_size or 0, size)
     if size != pictures.video_size:
-        found.append(
-            f"the videos are {size}×{size} pixels and the run reads {pictures.video_size}×{pictures.video_size}: "
-            f"pass --pictures.video-size {size}, or make the videos again at {pictures.video_size}"
+        found.append(f"{size}×{size} pixels where the run reads {pictures.video_size}×{pictures.video_size}")
+    elif manifest.agent_size is not None and rendered != pictures.picture_size:
+        found.append(f"rendered at {rendered} pixels where the run renders at {pictures.picture_size}")
+    if profile is not None and profile != pictures.profile:
+        found.append(f"rendered with profile {profile} where the run renders with {pictures.profile}")
+    if not found:
+        return []
+    again = f"import them again with --size {pictures.video_size}"
+    if manifest.task is not None:
+        again = (
+            f"record them again with --video-size {pictures.video_size} --agent-size {pictures.agent_size} "
+            f"--profile {pictures.profile}"
         )
-    elif manifest.agent_size is not None and max(manifest.agent_size, size) != pictures.picture_size:
-        found.append(
-            f"the videos were rendered at {max(manifest.agent_size, size)} pixels and the run renders at "
-            f"{pictures.picture_size} before it resizes: pass --pictures.agent-size {manifest.agent_size}, or "
-            f"record the videos again with --agent-size {pictures.agent_size}"
-        )
-    return found
+    return [f"the videos are {', and '.join(found)}: pass {picture_flags(manifest, pictures)}, or {again}"]
+
+
+def picture_flags(manifest: Manifest, pictures: PictureConfig) -> str:
+    """What a run with these pictures must be told to see the environment as the videos show it; "" for nothing."""
+    return " ".join(
+        f"--pictures.{name.replace('_', '-')} {value}"
+        for name, value in _shown_like(manifest, pictures).items()
+        if value != getattr(pictures, name)
+    )
+
+
+def _shown_like(manifest: Manifest, pictures: PictureConfig) -> dict[str, Any]:
+    """The sizes and the profile of videos.
+
+    Imported ones know no profile and no size for the agent: the run's own remain, but for an agent that would see more
+    pixels than the videos have.
+    """
+    return {
+        "video_size": manifest.video_size,
+        "agent_size": manifest.agent_size or min(pictures.agent_size, manifest.video_size),
+        "profile": manifest.render_profile or pictures.profile,
+    }
 
 
 def _too_short(manifest: Manifest, task: Task) -> str:

@@ -232,7 +232,8 @@ def _instants_before(seconds: float, frames_per_second: float) -> int:
 def _seconds(source: Source, timed: TimedFrame) -> float:
     if timed.seconds is None:
         raise BootifolError(
-            f"{source} has no times to resample by (only video files do): import it without --fps"
+            f"{source} has no times to resample by (only video files do): import it without --fps, and with --frames "
+            "instead of --task"
         )
     return timed.seconds
 
