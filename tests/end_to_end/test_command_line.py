@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from bootifol.cli.main import main
+from bootifol.cli.main import DESCRIPTION, main
 from bootifol.demos.augmentation import AugmentedVideos
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.video_writing import write_video
@@ -210,3 +211,60 @@ def test_help_breaks_lines_where_the_terminal_ends_and_not_where_a_docstring_doe
     with pytest.raises(SystemExit):
         main(["experts", "train", "--help"])
     assert "shorter ones show more starts, which is what rare rewards need" in capsys.readouterr().out
+    monkeypatch.setenv("COLUMNS", "120")  # one panel below the other
+    for _ in range(2):  # what is joined once stays as it is
+        with pytest.raises(SystemExit):
+            main(["train", "--help"])
+        printed = " ".join(capsys.readouterr().out.replace("│", " ").split())
+        assert "cuda:NUMBER, or mps on a Mac. None but the CPU has been tried. (default: auto)" in printed
+        assert "those still in replay; 0 as in the paper, whose" in printed, "a setting of a setting"
+
+
+@pytest.mark.parametrize(
+    ("command", "usage"),
+    [
+        (["evaluate"], "RUN [--episodes INT]"),
+        (["score"], "RUN VIDEO [VIDEO ...] [--out"),
+        (["report"], "RUN [RUN ...] [--out"),
+        (["table"], "RUN [RUN ...] [--out"),
+        (["tasks"], "[NAME ...] [--measure"),
+        (["demos", "import"], "VIDEO [VIDEO ...]"),
+        (["demos", "check"], "DEMOS"),
+        (["demos", "export"], "DEMOS"),
+    ],
+    ids=lambda words: words[-1] if isinstance(words, list) else None,
+)
+def test_arguments_by_place_say_what_they_are(
+    command: list[str], usage: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    with pytest.raises(SystemExit):
+        main([*command, "--help"])
+    printed = capsys.readouterr().out
+    assert usage in printed.splitlines()[0]
+    assert "(default: )" not in printed
+
+
+def test_what_training_cannot_do_without_is_required(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
+    with pytest.raises(SystemExit):
+        main(["train", "--help"])
+    printed = capsys.readouterr().out
+    for flag in ("--demos PATH", "--out PATH"):
+        assert "(required)" in printed.partition(flag)[2].partition(" --")[0]
+
+
+def test_the_first_tour_can_be_copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every line of it, but for the training, which takes minutes."""
+    monkeypatch.chdir(tmp_path)
+    tour = DESCRIPTION.partition("simulator:\n")[2].partition("\n\n")[0].replace("\\\n", " ")
+    record, train, evaluate, report = (shlex.split(line)[1:] for line in tour.splitlines())
+    record[record.index("150")] = "20"
+    assert main(record) == 0
+    shorter = ["--alignment.gradient-steps", "2", "--interactive.agent-steps", "60", "--tensorboard", "False"]
+    shorter += ["--evaluation.final-episodes", "1", "--evaluation.showcase-episodes", "1"]
+    assert main([*train, *shorter]) == 0
+    assert main([*evaluate, "--episodes", "1"]) == 0
+    assert main(report) == 0

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-import tyro
-
+from bootifol.cli.arguments import DemosPath, VideoPaths
 from bootifol.demos.manifest import Manifest
 from bootifol.errors import STOPPED, BootifolError
 
@@ -68,7 +67,7 @@ def record(
 
 
 def import_(
-    videos: Annotated[list[Path], tyro.conf.Positional],
+    videos: VideoPaths,
     out: Path,
     task: str | None = None,
     action_repeat: int | None = None,
@@ -136,7 +135,7 @@ def import_(
 
 
 def check(
-    demos: Annotated[Path, tyro.conf.Positional],
+    demos: DemosPath,
     task: str | None = None,
     episode_steps: int | None = None,
     action_repeat: int | None = None,
@@ -182,7 +181,7 @@ def check(
 
 
 def export(
-    demos: Annotated[Path, tyro.conf.Positional],
+    demos: DemosPath,
     out: Path,
     format: Literal["mp4", "npy", "lerobot"] = "mp4",
     behavior: str = "expert",

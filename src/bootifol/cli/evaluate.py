@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import tyro
 from rich.console import Console
 
+from bootifol.cli.arguments import RunPaths
 from bootifol.errors import BootifolError
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def evaluate(
-    runs: Annotated[list[Path], tyro.conf.Positional],
+    runs: RunPaths,
     episodes: int = 10,
     seed: int = 1000,
     out: Path | None = None,

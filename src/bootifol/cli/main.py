@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import functools
 import os
-import re
 import sys
 from collections.abc import Callable, Sequence
 
 import tyro
 from rich.console import Console
 
+from bootifol.cli.help_texts import join_lines
 from bootifol.errors import STOPPED, BootifolError
 
 DESCRIPTION = """Videos in, policy out: learns a reward from videos of a task, and trains a pixel policy on it.
 
-A first tour:
-  bootifol doctor                                                     can this machine do it
-  bootifol demos record --task reacher_hard --out demos/reacher_hard  expert videos to learn from
-  bootifol train --demos demos/reacher_hard --out runs/first          a policy
-  bootifol report runs/first                                          what it learned
+A first tour, about three minutes without a simulator:
+  bootifol demos record --task drawn_home --episodes 150 \\
+    --agent-size 32 --video-size 32 --out demos/drawn_home
+  bootifol train --preset drawn --demos demos/drawn_home --out runs/first
+  bootifol evaluate runs/first
+  bootifol report runs/first
+
+`bootifol doctor` says what this machine can do, `bootifol tasks` what there is to learn.
 """
 
 DEMOS_DESCRIPTION = "Make, import, check and export sets of videos to learn from."
 EXPERTS_DESCRIPTION = "Train who performs a task in recordings, where none is bundled."
-
-_CONTINUED_LINE = re.compile(r"\n {12,}(?=\S)")
-"""Where the description of an argument goes on in the next line of a docstring."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -60,9 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(commands: dict[str, Callable[..., int]], words: list[str], prog: str, description: str) -> int:
     for command in commands.values():
-        function = command.func if isinstance(command, functools.partial) else command
-        # tyro would keep the line breaks of a docstring in the help, which has another width.
-        function.__doc__ = _CONTINUED_LINE.sub(" ", function.__doc__ or "")
+        join_lines(command)
     code: int = tyro.extras.subcommand_cli_from_dict(
         commands,
         prog=prog,

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import tyro
+from bootifol.cli.arguments import RunPaths
 
 
-def report(runs: Annotated[list[Path], tyro.conf.Positional], out: Path | None = None) -> int:
+def report(runs: RunPaths, out: Path | None = None) -> int:
     """Write what one run learned, or several side by side, as one HTML file that opens in any browser.
 
     Args:

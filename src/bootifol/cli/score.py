@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import tyro
 from rich.console import Console
 from rich.table import Table
 
+from bootifol.cli.arguments import RunPath, VideoPaths
+
 
 def score(
-    run: Annotated[Path, tyro.conf.Positional],
-    videos: Annotated[list[Path], tyro.conf.Positional],
+    run: RunPath,
+    videos: VideoPaths,
     out: Path | None = None,
     picture: Path | None = None,
 ) -> int:

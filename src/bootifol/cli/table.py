@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import tyro
+from bootifol.cli.arguments import RunPaths
 
 
-def table(runs: Annotated[list[Path], tyro.conf.Positional], out: Path | None = None) -> int:
+def table(runs: RunPaths, out: Path | None = None) -> int:
     """Print the paper's result tables, scaled and absolute, with the returns of your runs beside the paper's.
 
     Runs that differ in their seed alone share a row. Below the tables stands what was left out (unfinished runs,

@@ -14,11 +14,18 @@ from bootifol.errors import BootifolError
 from bootifol.tasks import TASKS, Task, frames_per_second, short_name, task_named
 
 
-def tasks(names: Annotated[tuple[str, ...], tyro.conf.Positional] = (), measure: int = 0) -> int:
+def tasks(
+    names: Annotated[
+        tuple[str, ...],
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="[NAME ...]", help_behavior_hint="(default: all)"),
+    ] = (),
+    measure: int = 0,
+) -> int:
     """List the tasks, the lengths of their episodes, and the returns of their expert and of random actions.
 
     Args:
-        names: Tasks to list; the whole catalogue by default. gymnasium:ID and MODULE:FUNCTION are tasks, too.
+        names: Tasks to list. gymnasium:ID and MODULE:FUNCTION are tasks, too.
         measure: Play this many evaluation episodes (seeds 0, 1, …) of each task's expert and of random actions, and
             print their mean return, standard deviation, 95% interval, and the share of episodes that succeeded at
             any step, where the environment says so.

@@ -31,14 +31,18 @@ def flags_of(words: Sequence[str]) -> list[str]:
 
 def train(
     config: Annotated[TrainingConfig, tyro.conf.arg(name="")],
-    task: str | None = None,
+    task: Annotated[
+        str | None, tyro.conf.arg(metavar="STR", help_behavior_hint="(default: of the videos)")
+    ] = None,
     method: str = "bootifol",
     preset: PresetName = "cpu",
-    demos: Path | None = None,
-    out: Path | None = None,
+    demos: Annotated[Path | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="(required)")] = None,
+    out: Annotated[Path | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="(required)")] = None,
     seed: int = 1,
     time_budget: str | None = None,
-    resume: Path | None = None,
+    resume: Annotated[
+        Path | None, tyro.conf.arg(metavar="RUN", help_behavior_hint="(no other flags)")
+    ] = None,
     words: Annotated[tuple[str, ...], tyro.conf.Fixed, tyro.conf.Suppress] = (),
 ) -> int:
     """Learn a reward from videos and train a policy on it, or go on with an interrupted run.
@@ -48,7 +52,7 @@ def train(
     Args:
         config: Every setting of the preset, which the flags below change one by one.
         task: The environment to act in: a name that `bootifol tasks` lists, gymnasium:ID, or MODULE:FUNCTION, which
-            returns a Gymnasium environment. By default the one that the videos were recorded in.
+            returns a Gymnasium environment. Recorded videos know theirs.
         method: bootifol, virl, context_translation and gaifo learn a reward from the videos; environment uses the true
             reward, as an upper bound. MODULE:NAME is a method of your own (docs/add_a_method.md).
         preset: paper: its hyperparameters to the digit. cpu: one to two hours on one core. demo: what `make demo` runs,
@@ -59,7 +63,7 @@ def train(
         seed: Of everything random.
         time_budget: Wall-clock time for learning, such as 90s, 45m or 1h30m; schedules are stretched to fit it.
             The final evaluation and the report come after it.
-        resume: Directory of an interrupted run to go on with; its own configuration is used, and no other flag allowed.
+        resume: Directory of an interrupted run to go on with; its own configuration is used.
         words: What was typed.
     """
     # Imported here: help should not wait for PyTorch.
