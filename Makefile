@@ -4,6 +4,11 @@ PYTHON ?= python3
 BIN := .venv/bin
 DEMO := demo
 SOURCES := src tests benchmarks examples
+# Another index for PyTorch: on Linux PyPI's wheels bring CUDA along, gigabytes that serve no machine without a GPU.
+#   make setup TORCH_INDEX=https://download.pytorch.org/whl/cpu
+TORCH_INDEX ?=
+INSTALL := $(BIN)/python -m pip install --quiet --constraint constraints.txt \
+  $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX))
 
 .PHONY: demo test check format bench setup clean
 
@@ -13,13 +18,13 @@ setup: .venv/complete
 .venv/ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable .
+	$(INSTALL) --editable .
 	bash scripts/opengl.sh $(BIN)/python
 	touch .venv/ready
 
 # Also every extra, linters and tests.
 .venv/complete: .venv/ready
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(INSTALL) --editable '.[dev]'
 	touch .venv/complete
 
 # Expert videos in, a reward, a policy and a report out: about 15 minutes on 2 cores.
