@@ -25,7 +25,8 @@ from bootifol.training.demonstrations import DemonstrationConfig
 PresetName = Literal["paper", "cpu", "demo", "drawn", "smoke", "backbone"]
 
 PAPER = TrainingConfig()
-"""The paper's hyperparameters to the digit: they are the defaults of every field."""
+"""The paper's hyperparameters, which are the defaults of every field; what the paper leaves open (frame drop, window,
+margin, warm-up, replay) is as in the authors' release (docs/bootifol.md)."""
 
 CPU = TrainingConfig(
     pictures=PictureConfig(agent_size=64, video_size=64),

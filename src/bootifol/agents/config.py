@@ -14,7 +14,7 @@ Observations = Literal["pictures", "encodings"]
 
 @dataclass(frozen=True)
 class DrQv2Config:
-    """DrQ-v2; the defaults are those of its paper, with the replay of the BootIfOL paper."""
+    """DrQ-v2; the defaults are those of its paper, with the replay of BootIfOL's release."""
 
     observations: Observations = "pictures"
     """pictures: convolutions of the agent's own read the frames (the paper's agent). encodings: an MLP reads what the

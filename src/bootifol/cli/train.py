@@ -55,7 +55,7 @@ def train(
             returns a Gymnasium environment. Recorded videos know theirs.
         method: bootifol, virl, context_translation and gaifo learn a reward from the videos; environment uses the true
             reward, as an upper bound. MODULE:NAME is a method of your own (docs/add_a_method.md).
-        preset: paper: its hyperparameters to the digit. cpu: one to two hours on one core. demo: what `make demo` runs,
+        preset: paper: its hyperparameters. cpu: one to two hours on one core. demo: what `make demo` runs,
             in minutes. drawn: the tasks drawn with numpy, in two minutes. smoke: every stage, in under two minutes.
             backbone: paper, with a pretrained EfficientNet-B0 that reads videos of 224x224 pixels.
         demos: Directory of the videos, from `bootifol demos record` or `bootifol demos import`.

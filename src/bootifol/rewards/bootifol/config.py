@@ -1,4 +1,4 @@
-"""What can be chosen about BootIfOL's reward model; the defaults are the paper's."""
+"""What can be chosen about BootIfOL's reward model; the defaults are the paper's, and its release's where it names none."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class BootifolConfig:
 
     reward: Literal["distance", "cosine"] = "distance"
     """distance (the paper): minus the Euclidean distance between the encodings of agent and expert.
-    cosine (the authors' released code): their cosine similarity, in [-1, 1]."""
+    cosine (a version of the authors' release): their cosine similarity, in [-1, 1]."""
 
     backbone: str | None = None
     """None: g_theta learns from pixels (the paper's BootIfOL). A name: g_theta is this frozen pretrained network and
