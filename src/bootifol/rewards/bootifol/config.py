@@ -1,4 +1,4 @@
-"""What can be chosen about BootIfOL's reward model; the defaults are the paper's, and its release's where it names none."""
+"""What can be chosen about BootIfOL's reward model; defaults are the paper's, or its release's where it is silent."""
 
 from __future__ import annotations
 
