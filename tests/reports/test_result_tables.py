@@ -37,6 +37,20 @@ def test_four_seeds_are_averaged_over_their_means(tmp_path: Path) -> None:
     assert scaled.mean == pytest.approx(0.30)
 
 
+def test_few_seeds_are_told_one_by_one(tmp_path: Path) -> None:
+    for seed, returns in enumerate([(50.0, 70.0), (-10.0, 8.0), (80.0, 100.0)], start=1):
+        write_run(tmp_path / f"virl{seed}", returns, seed=seed, method="virl")
+        write_run(tmp_path / f"walker{seed}", returns, seed=seed, task="walker_run", levels=None)
+    for seed in range(1, 7):
+        write_run(tmp_path / f"six{seed}", seed=seed)
+    write_run(tmp_path / "one", method="gaifo")
+    notes = "\n".join(results_of(tmp_path).notes)
+    assert "ViRL on Reacher Hard: seeds 1, 2, 3 with scaled means 0.60, −0.01, 0.90 (" in notes
+    assert "BootIfOL on Walker Run: seeds 1, 2, 3 with absolute means 60.0, −1.0, 90.0 (" in notes
+    assert "BootIfOL on Reacher Hard: seeds 1, 2, 3, 4, 5, 6 (" in notes
+    assert "GAIfO on Reacher Hard: seed 1 (" in notes
+
+
 def test_a_single_seed_is_summarized_over_its_episodes(tmp_path: Path) -> None:
     write_run(tmp_path / "a", (0.0, 0.0, 10.0, 20.0, 30.0, 40.0, 100.0, 1000.0))
     row = rows_of(results_of(tmp_path), "absolute")["BootIfOL"]
@@ -152,6 +166,9 @@ def test_csv_has_all_digits_and_every_note(tmp_path: Path) -> None:
     assert float(own["mean"]) == pytest.approx(1.0)
     assert float(own["mean_low"]) == pytest.approx(0.5)
     assert (own["seeds"], own["episodes"], own["intervals_over"]) == ("1 2", "4", "seeds")
+    assert [float(mean) for mean in own["seed_means"].split()] == pytest.approx([0.5, 1.5])
+    (paper,) = [r for r in records if r["agent"] == "ViRL" and r["measure"] == "absolute"]
+    assert paper["seed_means"] == ""
     assert (own["paper"], own["paper_deviation"]) == ("843.16", "274.84")
     assert any(str(tmp_path / "cut") in r["note"] and not r["task"] for r in records)
 

@@ -16,6 +16,11 @@ from bootifol.reports.run_files import RunFiles
 
 Measure = Literal["scaled", "absolute"]
 
+DECIMALS: dict[Measure, int] = {"scaled": 2, "absolute": 1}
+
+FEW_SEEDS = 5
+"""Up to so many, the mean of every seed is told below the table."""
+
 ENDS = ("Expert", "Random")
 """The ends of the scale: what is above and below all agents in an absolute table."""
 
@@ -44,6 +49,9 @@ class ResultRow:
 
     summary: Summary | None
     """Over seeds; with one seed over its episodes. None where nothing was run."""
+
+    seed_means: tuple[float, ...]
+    """Of the final episodes of every seed; empty where the summary is None."""
 
     level: float | None
     """The return of the expert or of the random agent that the runs were scaled with."""
@@ -124,16 +132,17 @@ def _rows(groups: Sequence[Group], papers: Mapping[str, PaperReturn], measure: M
         paper = papers.get(agent)
         if agent in ENDS and measure == "absolute" and (paper or levels) and not own:
             level = levels[ENDS.index(agent)] if levels else None
-            rows.append(ResultRow(groups[0].task, agent, (), 0, None, level, paper))
+            rows.append(ResultRow(groups[0].task, agent, (), 0, None, (), level, paper))
         elif agent in papers and agent not in ENDS and not own:
-            rows.append(ResultRow(groups[0].task, agent, (), 0, None, None, paper))
+            rows.append(ResultRow(groups[0].task, agent, (), 0, None, (), None, paper))
         has_usual = any(not group.variant for group in own)
         for group in own:
             finals = finals_of(group)
             episodes = sum(final.environment_return.count for final in finals)
             summary = over_seeds(finals, measure)
             theirs = None if group.variant and has_usual else paper
-            rows.append(ResultRow(group.task, group.name, group.runs, episodes, summary, None, theirs))
+            means = seed_means(finals, measure)
+            rows.append(ResultRow(group.task, group.name, group.runs, episodes, summary, means, None, theirs))
     return rows
 
 
@@ -144,13 +153,22 @@ def finals_of(group: Group) -> list[FinalReturn]:
 
 def over_seeds(finals: Sequence[FinalReturn], measure: Measure) -> Summary | None:
     """Summary of the seeds' means, or of the episodes of a single seed; None where a return is not scaled."""
+    summaries = _of_seeds(finals, measure)
+    if len(summaries) < 2:
+        return summaries[0] if summaries else None
+    return summarize([summary.mean for summary in summaries])
+
+
+def seed_means(finals: Sequence[FinalReturn], measure: Measure) -> tuple[float, ...]:
+    """The mean of every seed; empty where a return is not scaled."""
+    return tuple(summary.mean for summary in _of_seeds(finals, measure))
+
+
+def _of_seeds(finals: Sequence[FinalReturn], measure: Measure) -> list[Summary]:
+    """The summary of every seed's episodes; none where a return is not scaled."""
     found = [final.environment_return if measure == "absolute" else final.scaled_return for final in finals]
     summaries = [summary for summary in found if summary is not None]
-    if not summaries or len(summaries) < len(found):
-        return None
-    if len(summaries) == 1:
-        return summaries[0]
-    return summarize([summary.mean for summary in summaries])
+    return summaries if len(summaries) == len(found) else []
 
 
 def _levels(groups: Sequence[Group]) -> tuple[float, float] | None:
@@ -187,13 +205,31 @@ def _scale_notes(comparison: Comparison) -> list[str]:
     return notes
 
 
+def number(value: float, measure: Measure) -> str:
+    """A return with the digits of its tables, and a real minus sign."""
+    # Adding 0 turns a rounded -0 into 0.
+    rounded = round(value, DECIMALS[measure]) + 0.0
+    return f"{rounded:.{DECIMALS[measure]}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def _told_seeds(group: Group) -> str:
+    """Such as `seeds 1, 2 with scaled means 0.78, 0.89`; the means where there are few seeds, but more than one."""
+    finals = finals_of(group)
+    if not 1 < len(finals) <= FEW_SEEDS:
+        return group.seeds
+    measure: Measure = "scaled" if seed_means(finals, "scaled") else "absolute"
+    means = ", ".join(number(mean, measure) for mean in seed_means(finals, measure))
+    return f"{group.seeds} with {measure} means {means}"
+
+
 def _provenance(comparison: Comparison) -> list[str]:
     """What each row is made of."""
     notes = []
     for group in comparison.groups:
         steps = sorted({run.agent_steps for run in group.runs})
         presets = ", ".join(dict.fromkeys(run.preset for run in group.runs))
-        told = f"{group.name} on {task_title(group.task)}: {group.seeds} ({paths_of(group.runs)}), preset {presets}"
+        made_of = f"{_told_seeds(group)} ({paths_of(group.runs)}), preset {presets}"
+        told = f"{group.name} on {task_title(group.task)}: {made_of}"
         if group.runs[0].method not in LEARN_NOTHING:
             trained = " to ".join(f"{count:,}" for count in dict.fromkeys((steps[0], steps[-1])))
             told += f", budget {budget(group.runs[0])}, trained for {trained} agent steps"

@@ -10,7 +10,7 @@ from pathlib import Path
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.reports.names import task_title
-from bootifol.reports.result_tables import Measure, ResultRow, Results, ResultTable, result_tables
+from bootifol.reports.result_tables import Measure, ResultRow, Results, ResultTable, number, result_tables
 from bootifol.reports.run_files import find_runs, read_run
 
 HEADER = ("Task", "Agent", "Seeds", "Episodes", "Mean [95 %]", "IQM [95 %]", "Paper")
@@ -18,10 +18,8 @@ HEADER = ("Task", "Agent", "Seeds", "Episodes", "Mean [95 %]", "IQM [95 %]", "Pa
 CSV_HEADER = (
     *("table", "measure", "task", "agent", "seeds", "episodes", "mean", "mean_low", "mean_high"),
     *("interquartile_mean", "interquartile_mean_low", "interquartile_mean_high", "intervals_over"),
-    *("paper", "paper_deviation", "runs", "note"),
+    *("seed_means", "paper", "paper_deviation", "runs", "note"),
 )
-
-DECIMALS: dict[Measure, int] = {"scaled": 2, "absolute": 1}
 
 NOTHING = "–"
 """Where nothing was run, or the paper has no number."""
@@ -131,7 +129,7 @@ def _cells(row: ResultRow, measure: Measure) -> tuple[str, ...]:
     """Agent, seeds, episodes, mean, interquartile mean, the paper's number."""
     paper = _paper(row, measure)
     if row.summary is None:
-        level = NOTHING if row.level is None else _number(row.level, measure)
+        level = NOTHING if row.level is None else number(row.level, measure)
         return row.agent, _count(len(row.runs)), _count(row.episodes), level, NOTHING, paper
     mark = " †" if len(row.runs) == 1 else ""
     mean = _with_interval(row.summary.mean, row.summary.interval, measure)
@@ -143,26 +141,20 @@ def _paper(row: ResultRow, measure: Measure) -> str:
     if row.paper is None or (measure == "scaled" and row.paper.scaled is None):
         return NOTHING
     if row.paper.scaled is not None and measure == "scaled":
-        return _number(row.paper.scaled, measure)
+        return number(row.paper.scaled, measure)
     # With the digits that the paper prints.
     return f"{row.paper.absolute:.2f} ± {row.paper.deviation:.2f}"
 
 
-def _count(number: int) -> str:
-    return str(number) if number else NOTHING
-
-
-def _number(value: float, measure: Measure) -> str:
-    # Adding 0 turns a rounded -0 into 0.
-    rounded = round(value, DECIMALS[measure]) + 0.0
-    return f"{rounded:.{DECIMALS[measure]}f}".replace("-", "\N{MINUS SIGN}")
+def _count(count: int) -> str:
+    return str(count) if count else NOTHING
 
 
 def _with_interval(value: float, interval: tuple[float, float] | None, measure: Measure) -> str:
     if interval is None:
-        return _number(value, measure)
+        return number(value, measure)
     low, high = interval
-    return f"{_number(value, measure)} [{_number(low, measure)}, {_number(high, measure)}]"
+    return f"{number(value, measure)} [{number(low, measure)}, {number(high, measure)}]"
 
 
 def _record(row: ResultRow, measure: Measure) -> dict[str, object]:
@@ -186,6 +178,7 @@ def _record(row: ResultRow, measure: Measure) -> dict[str, object]:
             "interquartile_mean_low": middle_low,
             "interquartile_mean_high": middle_high,
             "intervals_over": "seeds" if len(row.runs) > 1 else "episodes",
+            "seed_means": " ".join(str(mean) for mean in row.seed_means),
         }
     if row.paper is not None:
         record["paper"] = row.paper.scaled if measure == "scaled" else row.paper.absolute
