@@ -25,13 +25,14 @@ def draw(runs: list[RunFiles], arguments: argparse.Namespace) -> tuple[Figure, S
     left_out = [
         f"{run.path} learns nothing, so it has no curve." for run in runs if run.method in LEARN_NOTHING
     ]
-    return returns_figure(comparison, arguments.by_time), [*comparison.notes, *left_out]
+    return returns_figure(comparison, arguments.by_time, arguments.scaled), [*comparison.notes, *left_out]
 
 
 @command()
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = figure_parser(__doc__)
     parser.add_argument("--by-time", action="store_true", help="over wall-clock time instead of agent steps")
+    parser.add_argument("--scaled", action="store_true", help="0 for random actions, 1 for the expert")
     write_figure(parser, draw, arguments)
 
 

@@ -75,6 +75,32 @@ def test_returns_over_time_stand_at_their_minutes(tmp_path: Path) -> None:
     assert points(axes)[:, 0] == pytest.approx([1.0, 2.0])
 
 
+def test_scaled_returns_are_of_episodes_that_have_a_scale(tmp_path: Path) -> None:
+    for seed, final in ((1, (40.0, 60.0)), (2, (80.0, 100.0))):
+        directory = write_run(tmp_path / f"seed{seed}", final, seed=seed, curve=CURVE)
+        on_the_way = EvaluationRow(500, 30.0, 500, 0, 7, 10.0 * seed, 0.1 * seed, None)
+        append_evaluations(directory / "evaluations.csv", [on_the_way])
+    axes = returns_figure(comparison_of(tmp_path), scaled=True).axes[0]
+    assert points(axes) == pytest.approx(np.array([(500.0, 0.15), (1000.0, 0.7)]))
+    assert axes.get_ylabel() == "scaled return of 500-step episodes"
+    assert {text.get_text() for text in axes.texts} == {"expert", "random"}
+
+
+def test_scaled_returns_want_a_scale(tmp_path: Path) -> None:
+    write_run(tmp_path / "a", levels=None, curve=CURVE)
+    with pytest.raises(BootifolError, match="a has no scaled evaluations"):
+        returns_figure(comparison_of(tmp_path), scaled=True)
+
+
+def test_a_long_legend_leaves_the_plots_their_height(tmp_path: Path) -> None:
+    write_run(tmp_path / "a", curve=CURVE)
+    low = returns_figure(comparison_of(tmp_path))
+    for number in range(5):
+        write_run(tmp_path / f"own{number}", method=f"a_long_name_of_a_module:Method{number}", curve=CURVE)
+    high = returns_figure(comparison_of(tmp_path))
+    assert high.get_figheight() == pytest.approx(low.get_figheight() + 4 * 0.19)
+
+
 def test_episodes_of_different_lengths_are_not_drawn_together(tmp_path: Path) -> None:
     write_run(tmp_path / "a", curve=CURVE)
     write_run(tmp_path / "b", method="virl")

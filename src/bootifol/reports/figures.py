@@ -16,7 +16,7 @@ from bootifol.errors import BootifolError
 from bootifol.evaluation.summary import summarize
 from bootifol.reports.comparison import Comparison, Group, compare
 from bootifol.reports.names import task_title
-from bootifol.reports.plots import binned
+from bootifol.reports.plots import binned, draw_levels, returns_of
 from bootifol.reports.run_files import INTERACTIVE, Curve, RunFiles
 from bootifol.reports.style import (
     FAINT,
@@ -69,7 +69,7 @@ def over_seeds(curves: Sequence[Curve]) -> Band:
     return _band(moments, values)
 
 
-def returns_figure(comparison: Comparison, by_time: bool = False) -> Figure:
+def returns_figure(comparison: Comparison, by_time: bool = False, scaled: bool = False) -> Figure:
     """Average return of evaluation episodes while agents learn: a panel a task, a line an agent.
 
     The episodes are the shortest that were evaluated (60 agent steps in the paper); where agents of a task differ in
@@ -78,6 +78,7 @@ def returns_figure(comparison: Comparison, by_time: bool = False) -> Figure:
     Args:
         comparison: the agents.
         by_time: over minutes of wall-clock time instead of agent steps.
+        scaled: returns with 0 for random actions and 1 for the expert, of the shortest episodes that have a scale.
 
     Raises:
         BootifolError: there is no run, or one was not evaluated as the others of its task.
@@ -88,15 +89,17 @@ def returns_figure(comparison: Comparison, by_time: bool = False) -> Figure:
     panels = []
     for task in comparison.tasks():
         groups = comparison.of(task)
-        length = _common_length(groups)
-        panels.append((task, length, [(group, _returns(group, length, by_time)) for group in groups]))
+        length = _common_length(groups, scaled)
+        panels.append((task, length, [(group, _returns(group, length, by_time, scaled)) for group in groups]))
     with house_style():
         figure, all_axes = _panels(len(panels))
         for axes, (task, length, bands) in zip(all_axes, panels, strict=True):
             for group, band in bands:
                 _draw(axes, band, colors[group.name], labels[group.name], marked=True)
             axes.set_title(task_title(task), loc="left", fontsize=9.5)
-            axes.set_ylabel(f"return of {length}-step episodes")
+            axes.set_ylabel(f"{'scaled ' if scaled else ''}return of {length}-step episodes")
+            if scaled:
+                draw_levels(axes, random=0.0, expert=1.0)
             if by_time:
                 step_axis(axes, "minutes of wall-clock time")
             else:
@@ -180,18 +183,20 @@ def require_groups(comparison: Comparison) -> None:
         raise BootifolError(" ".join(["there is no run to draw.", *comparison.notes]))
 
 
-def _common_length(groups: Sequence[Group]) -> int:
+def _common_length(groups: Sequence[Group], scaled: bool) -> int:
     """Agent steps of the shortest evaluation episodes; where they differ, of the shortest that all have a curve of."""
     runs = [run for group in groups for run in group.runs]
     lengths: dict[int, RunFiles] = {}
     for run in runs:
-        if not run.episode_lengths():
-            raise BootifolError(f"{run.path} has no evaluations; let it train longer, or leave it out")
-        lengths.setdefault(run.episode_lengths()[0], run)
+        if not run.episode_lengths(scaled):
+            kind = "scaled evaluations" if scaled else "evaluations"
+            raise BootifolError(f"{run.path} has no {kind}; let it train longer, or leave it out")
+        lengths.setdefault(run.episode_lengths(scaled)[0], run)
     if len(lengths) == 1:
         return next(iter(lengths))
     curves = [
-        {length for length in run.episode_lengths() if len(run.evaluations_of(length)) > 1} for run in runs
+        {length for length in run.episode_lengths(scaled) if len(run.evaluations_of(length)) > 1}
+        for run in runs
     ]
     shared = set.intersection(*curves)
     if not shared:
@@ -200,12 +205,12 @@ def _common_length(groups: Sequence[Group]) -> int:
     return min(shared)
 
 
-def _returns(group: Group, length: int, by_time: bool) -> Band:
+def _returns(group: Group, length: int, by_time: bool, scaled: bool) -> Band:
     curves, episodes = [], []
     for run in group.runs:
         evaluations = list(run.evaluations_of(length).values())
         moments = [rows[0].seconds / 60 if by_time else rows[0].agent_steps for rows in evaluations]
-        episodes = [[row.environment_return for row in rows] for rows in evaluations]
+        episodes = [returns_of(rows, scaled) for rows in evaluations]
         curves.append(Curve(np.array(moments, float), np.array([np.mean(returns) for returns in episodes])))
     if len(curves) > 1:
         return over_seeds(curves)

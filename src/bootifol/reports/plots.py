@@ -111,7 +111,7 @@ def draw_return_curves(axes: Axes, looks: Sequence[RunLook], scaled: bool, by_ti
     if not drawn:
         return False
     if levels is not None:
-        _draw_levels(axes, *levels)
+        draw_levels(axes, *levels)
     axes.set_ylabel("scaled return" if scaled else "return of an episode")
     if by_time:
         step_axis(axes, "minutes of wall-clock time")
@@ -178,7 +178,7 @@ class _Point:
 def _evaluation_curve(grouped: dict[int, list[EvaluationRow]], scaled: bool, by_time: bool) -> list[_Point]:
     points = []
     for rows in grouped.values():
-        values = _values(rows, scaled)
+        values = returns_of(rows, scaled)
         if values:
             summary = summarize(values, resamples=1000)
             low, high = summary.interval or (summary.mean, summary.mean)
@@ -190,7 +190,8 @@ def _when(row: EvaluationRow, by_time: bool) -> float:
     return row.seconds / 60 if by_time else float(row.agent_steps)
 
 
-def _values(rows: Sequence[EvaluationRow], scaled: bool) -> list[float]:
+def returns_of(rows: Sequence[EvaluationRow], scaled: bool) -> list[float]:
+    """The returns of episodes; scaled on request, where they have a scale."""
     if scaled:
         return [row.scaled_return for row in rows if row.scaled_return is not None]
     return [row.environment_return for row in rows]
@@ -200,7 +201,7 @@ def _scatter_episodes(axes: Axes, look: RunLook, episode_steps: int, scaled: boo
     points = [
         (_when(rows[0], by_time), value)
         for rows in look.run.evaluations_of(episode_steps).values()
-        for value in _values(rows, scaled)
+        for value in returns_of(rows, scaled)
     ]
     when, values = zip(*points, strict=True)
     axes.scatter(when, values, s=7, color=look.color, alpha=0.22, linewidth=0)
@@ -233,7 +234,8 @@ def _draw_long_evaluations(axes: Axes, look: RunLook, episode_steps: int, by_tim
             )
 
 
-def _draw_levels(axes: Axes, random: float, expert: float) -> None:
+def draw_levels(axes: Axes, random: float, expert: float) -> None:
+    """Two level lines with their names, and room for them."""
     # The curve starts near random and ends near the expert: the labels stand at the other ends.
     for kind, level, side, align in (("expert", expert, 0.01, "left"), ("random", random, 0.99, "right")):
         axes.axhline(level, color=KIND_COLORS[kind], linewidth=1.1, linestyle=(0, (4, 3)), zorder=1)

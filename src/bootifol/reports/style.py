@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -109,18 +110,23 @@ def require_png(out: Path) -> None:
 
 
 def legend_above(figure: Figure) -> None:
-    """One legend above all plots, every label once, in as many columns as its labels leave room for."""
+    """One legend above all plots, every label once, in as many columns as its labels leave room for.
+
+    The figure grows by its third line and those that follow, so that the plots keep their height.
+    """
     lines: dict[str, Any] = {}
     for axes in figure.axes:
         for line, label in zip(*axes.get_legend_handles_labels(), strict=True):
             lines.setdefault(label, line)
     # A label wants about 0.55 inches for its line and 0.07 a letter.
     inches = 0.55 + 0.07 * max(len(label) for label in lines)
+    columns = max(1, int(figure.get_figwidth() / inches))
+    figure.set_figheight(figure.get_figheight() + 0.19 * max(math.ceil(len(lines) / columns) - 2, 0))
     figure.legend(
         list(lines.values()),
         list(lines),
         loc="outside upper left",
-        ncols=max(1, int(figure.get_figwidth() / inches)),
+        ncols=columns,
         handlelength=2.4,
         columnspacing=1.2,
     )
