@@ -4,6 +4,8 @@
     OUT/TASK/METHOD[-VARIANT]/seedN.log       what it printed, in all attempts
     OUT/TASK/METHOD[-VARIANT]/seedN.failed    the sentence it failed with, if it did
 
+    OUT/modules                               the module of the tutorial's method, where a run is of that
+
     KEEP/TASK/METHOD[-VARIANT]/seedN          what tables read of a run that is done, where there is to be such a copy
 
 There is no other record: what is done and what is left is read from these files.
@@ -23,8 +25,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 
+from benchmarks.page_modules import ADD_A_METHOD, write_page_modules
 from benchmarks.run_state import RunState, check_is_planned, error_file, keep, log_file, run_state
-from benchmarks.suites import RANDOM, VIDEOS, PlannedRun, demos_of
+from benchmarks.suites import OPTIMAL_TRANSPORT, RANDOM, VIDEOS, PlannedRun, demos_of
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.errors import STOPPED, BootifolError
 from bootifol.files import written_aside
@@ -119,6 +122,10 @@ class RunQueue:
         """Where its results are kept, too."""
         return None if self.kept is None else self.kept / run.name
 
+    @property
+    def _modules(self) -> Path:
+        return self.out / "modules"
+
     def state(self, run: PlannedRun) -> RunState:
         """How far a run is."""
         return run_state(self.directory(run), self.copy(run))
@@ -144,6 +151,8 @@ class RunQueue:
                     self._keep(run)
                 waiting = [run for run in self.runs if self.state(run).state != "done"]
                 waiting = self._with_demos(waiting, interruption, lock)
+                if any(run.system.method == OPTIMAL_TRANSPORT for run in waiting):
+                    write_page_modules(ADD_A_METHOD, self._modules)
                 free = list(self._cores)
                 while waiting or self._active:
                     if interruption.requested:
@@ -226,6 +235,7 @@ class RunQueue:
     def _start(self, command: Sequence[str], log: Path, lock: int) -> tuple[subprocess.Popen[bytes], int]:
         """A process that appends to a log; returns it and where in the log it begins."""
         log.parent.mkdir(parents=True, exist_ok=True)
+        found_in = [str(self._modules.resolve()), os.environ.get("PYTHONPATH", "")]
         with log.open("ab") as file:
             file.write(f"$ {' '.join(command)}\n".encode())
             file.flush()
@@ -235,7 +245,7 @@ class RunQueue:
                 stdin=subprocess.DEVNULL,
                 stdout=file,
                 stderr=subprocess.STDOUT,
-                env={**os.environ, **_ONE_THREAD},
+                env={**os.environ, **_ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, found_in))},
                 # Ctrl-C in a terminal reaches the queue alone, which tells the runs once.
                 start_new_session=True,
                 # A run outlives a queue that is killed; the lock that it holds keeps other queues away from it.

@@ -59,6 +59,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--preset", choices=list(PRESETS), help="instead of the suite's")
     made.add_argument("--tasks", nargs="+", help="instead of the suite's")
     made.add_argument("--seeds", type=int, nargs="+", help="instead of the suite's")
+    made.add_argument("--own", nargs="+", default=[], metavar="MODULE:NAME", help="more methods to compare")
     made.add_argument("--only", nargs="+", metavar="PATTERN", help="runs by name, such as '*/virl/*'")
     made.add_argument(
         "--keep", type=Path, metavar="DIR", help="copies results of runs there; those that it has are done"
@@ -71,7 +72,7 @@ def parser() -> argparse.ArgumentParser:
 
 def _work(arguments: argparse.Namespace, program: Sequence[str]) -> int:
     runs = named(arguments.name).runs(
-        arguments.preset, arguments.tasks, arguments.seeds, timed=arguments.time_budget is not None
+        arguments.preset, arguments.tasks, arguments.seeds, arguments.time_budget is not None, arguments.own
     )
     runs = chosen(runs, arguments.only)
     out = arguments.out or Path("runs") / arguments.name

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from bootifol.errors import BootifolError
+from bootifol.own_modules import is_own_name
 from bootifol.presets import BACKBONE, PAPER, preset
 from bootifol.reports.names import CLONING_ALONE
 from bootifol.reports.paper_results import META_WORLD, RETURNS
@@ -31,6 +32,9 @@ Overrides = tuple[tuple[str, Value], ...]
 
 RANDOM = "random"
 """The lower end of the scale: it learns nothing, so `benchmarks/random_policy.py` plays it instead of `train`."""
+
+OPTIMAL_TRANSPORT = "optimal_transport:OptimalTransport"
+"""The method that docs/add_a_method.md adds, at sizes of its own; the queue writes its module."""
 
 UNHEARD: Overrides = (("agent.cloning_weight", CLONING_ALONE),)
 """No reward is heard, so the agent is what the videos' inferred actions make of it."""
@@ -52,8 +56,9 @@ class System:
 
     @property
     def name(self) -> str:
-        """METHOD or METHOD-VARIANT."""
-        return f"{self.method}-{self.variant}" if self.variant else self.method
+        """METHOD or METHOD-VARIANT; MODULE.NAME of a method of one's own."""
+        method = self.method.replace(":", ".")
+        return f"{method}-{self.variant}" if self.variant else method
 
     def is_compared_on(self, task: str) -> bool:
         """Whether the task is one of its own."""
@@ -146,6 +151,11 @@ def every_system(config: TrainingConfig, timed: bool) -> list[System]:
     ]
 
 
+def learning_test(config: TrainingConfig, timed: bool) -> list[System]:
+    """Every system, and a method that is no part of the library."""
+    return [*every_system(config, timed), System(OPTIMAL_TRANSPORT)]
+
+
 def virl_updates_every(config: TrainingConfig) -> int:
     """Agent steps between two gradient steps of ViRL, so that it takes twice BootIfOL's, as in the paper: there 50."""
     interactive, warm_up = config.interactive, config.agent.warm_up_steps
@@ -225,6 +235,25 @@ def policy_input_ablation(config: TrainingConfig, timed: bool) -> list[System]:
     return [System("bootifol"), System("bootifol", "encodings", (("agent.observations", "encodings"),))]
 
 
+def remedies(config: TrainingConfig, timed: bool) -> list[System]:
+    """The preset, and the preset without one of its departures from the paper, or with one more."""
+    paper = PAPER.agent
+    nothing_cloned = (
+        *(("demonstrations.share", 0.0), ("agent.cloning_weight", 0.0)),
+        *(("agent.warm_up_steps", paper.warm_up_steps), ("agent.warm_up_hold", paper.warm_up_hold)),
+        ("agent.exploration_start", paper.exploration_start),
+    )
+    clones = config.demonstrations.share > 0
+    return [
+        System("bootifol"),
+        System("bootifol", "no_saturation_weight", (("agent.saturation_weight", 0.0),)),
+        System("bootifol", "unscaled_reward", (("reward.bootifol.reward_scale", "none"),)),
+        System("bootifol", "rewards_stored_once", (("interactive.relabel_episodes", 0),)),
+        System("bootifol", "half_spoiled", (("reward.bootifol.spoiled_share", 0.5),)),
+        *([System("bootifol", "nothing_cloned", nothing_cloned)] if clones else []),
+    ]
+
+
 SMALL: Overrides = (
     ("pictures.agent_size", 32),
     ("pictures.video_size", 32),
@@ -262,6 +291,7 @@ class Suite:
         tasks: Sequence[str] | None = None,
         seeds: Sequence[int] | None = None,
         timed: bool = False,
+        own: Sequence[str] = (),
     ) -> list[PlannedRun]:
         """Its runs, the first seed of everything first.
 
@@ -270,12 +300,17 @@ class Suite:
             tasks: instead of its own.
             seeds: instead of its own.
             timed: whether each run has a time budget.
+            own: more methods to compare, as MODULE:NAME.
 
         Raises:
-            BootifolError: there is no such preset or task, or the preset does not allow what a system changes.
+            BootifolError: there is no such preset or task, the preset does not allow what a system changes, or a
+                method of one's own has no such name.
         """
+        for method in own:
+            if not is_own_name(method):
+                raise BootifolError(f"a method of your own is named MODULE:NAME, not '{method}'")
         name = preset_name or self.preset
-        systems = self.systems(preset(name), timed)
+        systems = list(dict.fromkeys([*self.systems(preset(name), timed), *map(System, own)]))
         runs = [
             PlannedRun(task, system.preset or name, system, seed)
             for seed in seeds or self.seeds
@@ -326,11 +361,18 @@ SUITES = {
         systems=policy_input_ablation,
     ),
     "drawn": Suite(
-        "every system on a task drawn with numpy, minutes a run",
+        "learning test: every system, and a tutorial's, on a task drawn with numpy, minutes a run",
         "drawn",
         ("drawn_home",),
         THREE_SEEDS,
-        every_system,
+        learning_test,
+    ),
+    "remedies": Suite(
+        "the preset without one of its departures from the paper, or with one more",
+        "drawn",
+        ("drawn_home",),
+        THREE_SEEDS,
+        remedies,
     ),
     "smoke": Suite("three runs of seconds, which learn nothing", "smoke", ("drawn_home",), (1,), smallest),
 }

@@ -1,6 +1,7 @@
 """Stands for `bootifol` in tests of the queue: does at once, or fails to do, what the method's name says.
 
-Every call is written to `calls.txt` in the working directory, as are the core and the threads that it was given.
+Every call is written to `calls.txt` in the working directory, as are the core and the threads that it was given; where
+modules are looked for, to `path.txt`.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ def main(words: list[str]) -> int:
     note(
         f"{'resume' if resumes else 'train'} {out.parent.name}/{out.name} {os.environ['OMP_NUM_THREADS']} {core}"
     )
+    Path("path.txt").write_text(os.environ["PYTHONPATH"])
     out.mkdir(parents=True, exist_ok=True)
     if not resumes:
         header = {name: values[f"--{name}"] for name in ("task", "method", "preset")}

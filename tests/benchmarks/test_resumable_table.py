@@ -13,7 +13,7 @@ COLUMNS = ("variant", "seed", "mean_return")
 
 
 def test_a_table_is_gone_on_with(tmp_path: Path) -> None:
-    path = tmp_path / "results" / "remedies.csv"
+    path = tmp_path / "results" / "cloning.csv"
     table = ResumableTable(path, COLUMNS)
     assert not table.has("preset, twice", 1)
     table.add({"mean_return": "3.5", "variant": "preset, twice", "seed": "1"})

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from benchmarks.run_queue import RunQueue, cores, missing_demos, record_words, what_went_wrong
 from benchmarks.run_state import run_state
-from benchmarks.suites import Overrides, PlannedRun, System, backbone_comparison
+from benchmarks.suites import OPTIMAL_TRANSPORT, Overrides, PlannedRun, System, backbone_comparison
 from fake_program import write_config, write_end
 
 from bootifol.demos.record import record
@@ -69,6 +69,18 @@ def test_runs_are_done_in_order_and_once(suite: Path) -> None:
     assert (suite / "out" / "drawn_home" / "bootifol" / "seed1" / "report.html").is_file()
     assert queue(suite, runs).work().done == 2
     assert calls(suite) == expected
+
+
+def test_the_tutorials_method_lies_where_its_run_looks_for_it(
+    suite: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", "mine")
+    queue(suite, planned("bootifol")).work()
+    assert not (suite / "out" / "modules").exists()
+    assert queue(suite, planned(OPTIMAL_TRANSPORT)).work().done == 1
+    module = (suite / "out" / "modules" / "optimal_transport.py").read_text()
+    assert "class OptimalTransport" in module
+    assert (suite / "path.txt").read_text() == os.pathsep.join([str(suite / "out" / "modules"), "mine"])
 
 
 def test_a_failed_run_stops_no_other_and_is_tried_again(suite: Path) -> None:

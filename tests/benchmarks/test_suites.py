@@ -27,6 +27,7 @@ from bootifol.presets import BACKBONE, CPU, PAPER, PRESETS, preset
 from bootifol.reports.paper_results import RETURNS
 from bootifol.reports.result_tables import result_tables
 from bootifol.reports.run_files import find_runs, read_run
+from bootifol.rewards.registry import METHODS
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
 
@@ -54,10 +55,11 @@ def parsed(words: list[str], preset: TrainingConfig) -> TrainingConfig:
 
 
 @pytest.mark.parametrize(
-    "name", ["reacher", "backbone", "alignment", "encoder_training", "policy_input", "smoke"]
+    "name",
+    ["reacher", "drawn", "backbone", "alignment", "encoder_training", "policy_input", "remedies", "smoke"],
 )
 def test_the_words_of_a_run_say_what_its_configuration_is(name: str) -> None:
-    for run in runs_of(name)[: len(SUITES[name].systems(CPU, False))]:
+    for run in [run for run in runs_of(name) if run.seed == 1]:
         words = run.words(Path("demos"), Path("out"), None)
         assert words[:6] == ["--task", run.task, "--method", run.system.method, "--preset", run.preset]
         assert parsed(words[words.index("--threads") :], preset(run.preset)) == run.config
@@ -140,6 +142,45 @@ def test_virl_takes_twice_as_many_gradient_steps_as_bootifol_whatever_the_preset
     assert virl_updates_every(PAPER) == 50  # N_update, with which the paper says so
     # cpu: 500 in the Alignment Phase and 9000 / 50 after it, twice that in 24,000 agent steps
     assert virl_updates_every(CPU) == round(24_000 / (2 * 680)) == 18
+
+
+def test_the_learning_test_compares_every_method_and_the_tutorials() -> None:
+    runs = [run for run in runs_of("drawn") if run.seed == 1]
+    assert [run.system.name for run in runs] == [
+        "bootifol",
+        "bootifol-cosine",
+        "virl",
+        "gaifo",
+        "context_translation-n1",
+        "context_translation-n10",
+        "environment",
+        "random",
+        "optimal_transport.OptimalTransport",
+    ]
+    assert {run.system.method for run in runs} == {*METHODS, "random", "optimal_transport:OptimalTransport"}
+
+
+def test_a_method_of_ones_own_stands_beside_the_others() -> None:
+    mine = SUITES["drawn"].runs(own=["my_package.mine:Method", "optimal_transport:OptimalTransport"])
+    assert len(mine) == len(runs_of("drawn")) + 3, "the tutorial's is there already"
+    name = "drawn_home/my_package.mine.Method/seed1"
+    words = next(run for run in mine if run.name == name).words(Path("demos"), Path("out"), None)
+    assert words[2:4] == ["--method", "my_package.mine:Method"]
+    with pytest.raises(BootifolError, match="is named MODULE:NAME, not 'virl'"):
+        SUITES["drawn"].runs(own=["virl"])
+
+
+def test_a_remedy_is_taken_away_from_the_preset_and_cloning_only_where_there_is_some() -> None:
+    drawn, cpu = ({run.system.variant: run for run in runs_of_remedies(name)} for name in ("drawn", "cpu"))
+    assert cpu.keys() - drawn.keys() == {"nothing_cloned"}
+    assert drawn["rewards_stored_once"].config.interactive.relabel_episodes == 0
+    agent = cpu["nothing_cloned"].config.agent
+    assert cpu["nothing_cloned"].config.demonstrations.share == agent.cloning_weight == 0
+    assert (agent.warm_up_steps, agent.warm_up_hold) == (PAPER.agent.warm_up_steps, PAPER.agent.warm_up_hold)
+
+
+def runs_of_remedies(preset_name: str) -> list[PlannedRun]:
+    return SUITES["remedies"].runs(preset_name, seeds=[1])
 
 
 def test_a_preset_that_clones_shows_what_cloning_alone_brings() -> None:
