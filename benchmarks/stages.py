@@ -132,7 +132,9 @@ def stages_of(run: Run) -> Iterator[Stage]:
     at_rest = (steps - until) / length
     yield Stage("rewarding an episode when it rests", at_rest, lambda: model.label(video, references))
     evaluations = steps / config.evaluation.every
-    yield Stage("evaluation on the way", evaluations, run._evaluate_while_training, computes=False, slow=True)
+    yield Stage(
+        "evaluation on the way", evaluations, run.measurements.returns_on_the_way, computes=False, slow=True
+    )
     yield Stage("checkpoint, each 20 minutes", 0, run._checkpoint, computes=False, slow=True)
 
 

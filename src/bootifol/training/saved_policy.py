@@ -92,11 +92,13 @@ def require_checkpoint(directory: Path) -> Path:
 
 
 def _policy_config(run: RunConfig, environment: PixelEnvironment, agent_steps: int) -> PolicyConfig:
+    shape = environment.action_space.shape
+    assert shape is not None
     return PolicyConfig(
         task=run.task,
         agent_steps=agent_steps,
-        action_dim=environment.simulator.action_dim,
-        action_repeat=environment.action_repeat,
+        action_dim=shape[0],
+        action_repeat=run.resolved_task().action_repeat,
         frames_per_second=environment.metadata["render_fps"],
         pictures=run.training.pictures,
     )

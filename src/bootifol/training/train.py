@@ -1,11 +1,13 @@
 """A run from its first step to its report: Alignment Phase, Interactive Phase, evaluation.
 
-What happens, in order, is `Run.learn` and `Run.finish`; what a phase does is in `alignment.py` and `interactive.py`.
+What happens, in order, is `Run.learn` and `Run.finish`; what a phase does is in `alignment.py`, `cloning.py` and
+`interactive.py`, and what is measured on the way in `measurements.py`.
 """
 
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,20 +16,8 @@ from rich.console import Console
 
 from bootifol.demos.augmentation import augmented
 from bootifol.devices import chosen_device
-from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
-from bootifol.evaluation.ranking import (
-    EXPERT_ABOVE_RANDOM,
-    KINDS,
-    expert_above_random,
-    rank_videos,
-    ranking_scores,
-)
-from bootifol.evaluation.returns import evaluate, evaluation_rows
-from bootifol.evaluation.showcase import play_showcase, write_showcase
-from bootifol.evaluation.summary import summarize
-from bootifol.evaluation.tables import append_evaluations, append_ranking, drop_later_rows
-from bootifol.experts import make_expert, make_random
+from bootifol.evaluation.tables import drop_later_rows
 from bootifol.memory import keep_freed_memory
 from bootifol.progress import progress
 from bootifol.rewards.registry import check_method
@@ -42,12 +32,13 @@ from bootifol.training.checkpoint import (
     save_checkpoint,
 )
 from bootifol.training.cloning import cloning_extent, cloning_phase
-from bootifol.training.components import build_components, build_environment, open_demos, reference_rng
-from bootifol.training.interactive import InteractivePhase, evaluation_seeds
+from bootifol.training.components import build_components, build_environment, open_demos
+from bootifol.training.interactive import InteractivePhase
 from bootifol.training.interruption import Interruption
+from bootifol.training.measurements import Measurements
 from bootifol.training.run_config import RunConfig
 from bootifol.training.saved_policy import save_policy
-from bootifol.types import Action, Metrics, Observation, Video
+from bootifol.types import Metrics
 
 
 class Run:
@@ -88,23 +79,33 @@ class Run:
             config.alignment.time_share,
         )
         self.interactive = InteractivePhase(
-            self.environment,
-            self.demos.expert,
-            self.components.agent_videos,
-            self.components.replay,
-            self.components.reward_model,
-            self.components.agent,
-            self.components.demonstrations,
-            config.interactive,
-            self.budget,
-            self.counters,
-            self.run.seed,
-            self.rng,
-            self.components.backbone,
-            self.demos.augmentation,
+            environment=self.environment,
+            expert=self.demos.expert,
+            agent_videos=self.components.agent_videos,
+            replay=self.components.replay,
+            reward_model=self.components.reward_model,
+            agent=self.components.agent,
+            demonstrations=self.components.demonstrations,
+            config=config.interactive,
+            budget=self.budget,
+            counters=self.counters,
+            seed=self.run.seed,
+            rng=self.rng,
+            backbone=self.components.backbone,
+            augmentation=self.demos.augmentation,
+        )
+        self.measurements = Measurements(
+            run=self.run,
+            directory=self.directory,
+            demos=self.demos,
+            environment=self.environment,
+            components=self.components,
+            budget=self.budget,
+            counters=self.counters,
+            console=self.console,
+            log=partial(self._log, "interactive", "agent_steps"),
         )
         self._saved_at = time.monotonic()
-        self._last_evaluation: dict[str, float] = {}
 
     def learn(self) -> bool:
         """Both phases.
@@ -124,13 +125,12 @@ class Run:
         """The measurements of a run that has ended: final returns, ranking, showcase.
 
         Returns:
-            The final returns: mean, and the ends of its 95 % interval.
+            The final returns by name.
         """
-        config = self.run.training.evaluation
-        scores = self._evaluate(self.task.evaluation_steps, config.final_episodes, "final evaluation")
-        self._rank()
-        self._showcase()
-        return scores
+        returns = self.measurements.final_returns()
+        self.measurements.rank()
+        self.measurements.showcase()
+        return returns
 
     def _align(self, interruption: Interruption) -> bool:
         config = self.run.training.alignment
@@ -160,7 +160,7 @@ class Run:
                 self._checkpoint_if_due()
         if not self.counters.alignment_steps:
             self.console.print("nothing to align: this method's reward learns nothing before the agent acts")
-        self._rank()
+        self.measurements.rank()
         self._checkpoint()
         return True
 
@@ -193,7 +193,7 @@ class Run:
                     return self._stop()
                 self._checkpoint_if_due()
         watch = Stopwatch()
-        self._evaluate_while_training()
+        self.measurements.returns_on_the_way()
         self._checkpoint()
         self.counters.cloning_seconds += watch.lap()
         return True
@@ -227,7 +227,7 @@ class Run:
                     )
                 if counters.agent_steps // config.evaluation.every > counters.evaluations:
                     counters.evaluations = counters.agent_steps // config.evaluation.every
-                    self._evaluate_while_training()
+                    self.measurements.returns_on_the_way()
                 _, now, _ = self.budget.interactive_extent(counters)
                 advance(min(now, total) - done, **self._shown())
                 done = min(now, total)
@@ -236,113 +236,12 @@ class Run:
                 self._checkpoint_if_due()
         return True
 
-    def _evaluate_while_training(self) -> None:
-        config = self.run.training.evaluation
-        episodes = {self.task.episode_steps: config.episodes}
-        # Where both lengths are one, it is evaluated once.
-        same = episodes.get(self.task.evaluation_steps, 0)
-        episodes[self.task.evaluation_steps] = max(same, config.long_episodes)
-        for episode_steps, count in episodes.items():
-            if count:
-                self._evaluate(episode_steps, count)
-
-    def _evaluate(self, episode_steps: int, episodes: int, description: str | None = None) -> Metrics:
-        """Plays episodes without noise and appends them to `evaluations.csv`."""
-        agent, counters = self.components.agent, self.counters
-        environment = build_environment(self.run, episode_steps)
-        steps = self.budget.scheduled_steps(counters)
-
-        def act(observation: Observation) -> Action:
-            return agent.act(observation, steps, explore=False)
-
-        seeds = evaluation_seeds(self.run.seed, episodes)
-        if description is None:
-            results = evaluate(environment, act, seeds)
-        else:
-            results = []
-            with progress(description, episodes) as advance:
-                for seed in seeds:
-                    results += evaluate(environment, act, [seed])
-                    advance(1)
-        environment.close()
-        at_evaluation_length = episode_steps == self.task.evaluation_steps
-        rows = evaluation_rows(
-            results,
-            agent_steps=counters.agent_steps,
-            seconds=counters.seconds,
-            episode_steps=episode_steps,
-            expert_return=self.task.expert_return if at_evaluation_length else None,
-            random_return=self.task.random_return if at_evaluation_length else None,
-        )
-        append_evaluations(self.directory / "evaluations.csv", rows)
-        returns = summarize([result.environment_return for result in results])
-        name = f"evaluation/return_{episode_steps}"
-        metrics = {name: returns.mean}
-        if at_evaluation_length and rows[0].scaled_return is not None:
-            metrics["evaluation/scaled_return"] = float(np.mean([row.scaled_return for row in rows]))
-        self._log("interactive", "agent_steps", counters.agent_steps, metrics)
-        self._last_evaluation.update(metrics)
-        return metrics
-
-    def _rank(self) -> None:
-        """Appends the rewards of held-out videos, and of the agent's newest ones, to `ranking.csv`."""
-        if not self.demos.held_out or self.components.reward_model.reads_environment_reward:
-            return
-        videos: dict[str, list[Video]] = dict(self.demos.held_out)
-        agent_videos = self.components.agent_videos
-        if len(agent_videos):
-            count = self.run.training.evaluation.held_out_videos
-            videos["agent"] = agent_videos.newest(count)
-        rows = rank_videos(
-            self.components.reward_model,
-            videos,
-            self.demos.expert,
-            reference_rng(self.run.seed, self.counters.agent_steps),
-            self.counters.agent_steps,
-        )
-        append_ranking(self.directory / "ranking.csv", rows)
-        if all(kind in videos for kind in KINDS):
-            scores = ranking_scores(rows)
-            self._log("interactive", "agent_steps", self.counters.agent_steps, scores.metrics())
-            self.console.print(
-                f"the learned reward on held-out videos: Kendall's tau {scores.kendall_tau:.2f} (a perfect order has "
-                f"{scores.perfect_tau:.2f}), expert above half-good {scores.expert_above_half_good:.0%}, half-good "
-                f"above random {scores.half_good_above_random:.0%}"
-            )
-        elif {"expert", "random"} <= videos.keys():
-            above = expert_above_random(rows)
-            self._log("interactive", "agent_steps", self.counters.agent_steps, {EXPERT_ABOVE_RANDOM: above})
-            self.console.print(f"the learned reward on held-out videos: expert above random {above:.0%}")
-
-    def _showcase(self) -> None:
-        """Expert, agent and random from the same starts, with the reward along them, for the report."""
-        count = self.run.training.evaluation.showcase_episodes
-        if not count:
-            return
-        agent, steps = self.components.agent, self.budget.scheduled_steps(self.counters)
-        acts: dict[str, Act] = {
-            "agent": lambda observation: agent.act(observation, steps, explore=False),
-            "random": make_random(self.environment, self.run.seed),
-        }
-        if self.task.has_expert:
-            acts = {"expert": make_expert(self.run.task, self.environment), **acts}
-        episodes = play_showcase(
-            self.environment,
-            acts,
-            evaluation_seeds(self.run.seed, count),
-            self.components.reward_model,
-            self.demos.expert,
-            reference_rng(self.run.seed, self.counters.agent_steps),
-            self.counters.agent_steps,
-        )
-        write_showcase(self.directory, episodes, self.environment.metadata["render_fps"])
-
     def _log(self, phase: str, count_name: str, count: int, metrics: Metrics) -> None:
         self.tracker.log(phase, count_name, count, self.counters.seconds, metrics)
 
     def _shown(self) -> dict[str, float]:
         """What stands beside the progress bar."""
-        short = {name.removeprefix("evaluation/"): value for name, value in self._last_evaluation.items()}
+        short = {name.removeprefix("evaluation/"): value for name, value in self.measurements.newest.items()}
         return {"agent_steps": self.counters.agent_steps, **short}
 
     def _resume(self) -> None:

@@ -1,0 +1,171 @@
+"""What a run measures and never learns from: returns of its policy, the order of held-out videos, a showcase."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from bootifol.envs.pixels import PixelEnvironment
+from bootifol.envs.rollout import Act
+from bootifol.evaluation.ranking import (
+    EXPERT_ABOVE_RANDOM,
+    KINDS,
+    expert_above_random,
+    rank_videos,
+    ranking_scores,
+)
+from bootifol.evaluation.returns import evaluate, evaluation_rows
+from bootifol.evaluation.showcase import play_showcase, write_showcase
+from bootifol.evaluation.summary import summarize
+from bootifol.evaluation.tables import append_evaluations, append_ranking
+from bootifol.experts import make_expert, make_random
+from bootifol.progress import progress
+from bootifol.training.budget import Budget, Counters
+from bootifol.training.components import Components, Demos, build_environment, reference_rng
+from bootifol.training.interactive import evaluation_seeds
+from bootifol.training.run_config import RunConfig
+from bootifol.types import Action, Metrics, Observation, Video
+
+
+class Measurements:
+    """Appends what it measures to the files of a run's directory.
+
+    Args:
+        run: what it is.
+        directory: where it writes.
+        demos: held-out videos, and the expert's, which rewards compare with.
+        environment: for the showcase; evaluations make their own.
+        components: the policy and the reward that are measured.
+        budget: where schedules stand.
+        counters: how far the run is.
+        console: where sentences go.
+        log: takes agent steps and metrics.
+    """
+
+    def __init__(
+        self,
+        run: RunConfig,
+        directory: Path,
+        demos: Demos,
+        environment: PixelEnvironment,
+        components: Components,
+        budget: Budget,
+        counters: Counters,
+        console: Console,
+        log: Callable[[int, Metrics], None],
+    ) -> None:
+        self._run, self._directory = run, directory
+        self._task, self._config = run.resolved_task(), run.training.evaluation
+        self._demos, self._environment, self._components = demos, environment, components
+        self._budget, self._counters = budget, counters
+        self._console, self._log = console, log
+        self.newest: dict[str, float] = {}
+        """Returns of the newest evaluation, by name."""
+
+    def final_returns(self) -> Metrics:
+        """Of the final evaluation, by name."""
+        return self._play(self._task.evaluation_steps, self._config.final_episodes, "final evaluation")
+
+    def returns_on_the_way(self) -> None:
+        """Of a few episodes of the training and of the evaluation length."""
+        episodes = {self._task.episode_steps: self._config.episodes}
+        # Where both lengths are one, it is evaluated once.
+        same = episodes.get(self._task.evaluation_steps, 0)
+        episodes[self._task.evaluation_steps] = max(same, self._config.long_episodes)
+        for episode_steps, count in episodes.items():
+            if count:
+                self._play(episode_steps, count)
+
+    def _play(self, episode_steps: int, episodes: int, description: str | None = None) -> Metrics:
+        """Plays episodes without noise and appends them to `evaluations.csv`."""
+        agent, counters = self._components.agent, self._counters
+        environment = build_environment(self._run, episode_steps)
+        steps = self._budget.scheduled_steps(counters)
+
+        def act(observation: Observation) -> Action:
+            return agent.act(observation, steps, explore=False)
+
+        seeds = evaluation_seeds(self._run.seed, episodes)
+        if description is None:
+            results = evaluate(environment, act, seeds)
+        else:
+            results = []
+            with progress(description, episodes) as advance:
+                for seed in seeds:
+                    results += evaluate(environment, act, [seed])
+                    advance(1)
+        environment.close()
+        at_evaluation_length = episode_steps == self._task.evaluation_steps
+        rows = evaluation_rows(
+            results,
+            agent_steps=counters.agent_steps,
+            seconds=counters.seconds,
+            episode_steps=episode_steps,
+            expert_return=self._task.expert_return if at_evaluation_length else None,
+            random_return=self._task.random_return if at_evaluation_length else None,
+        )
+        append_evaluations(self._directory / "evaluations.csv", rows)
+        returns = summarize([result.environment_return for result in results])
+        name = f"evaluation/return_{episode_steps}"
+        metrics = {name: returns.mean}
+        if at_evaluation_length and rows[0].scaled_return is not None:
+            metrics["evaluation/scaled_return"] = float(np.mean([row.scaled_return for row in rows]))
+        self._log(counters.agent_steps, metrics)
+        self.newest.update(metrics)
+        return metrics
+
+    def rank(self) -> None:
+        """Appends the rewards of held-out videos, and of the agent's newest ones, to `ranking.csv`."""
+        if not self._demos.held_out or self._components.reward_model.reads_environment_reward:
+            return
+        videos: dict[str, list[Video]] = dict(self._demos.held_out)
+        agent_videos = self._components.agent_videos
+        if len(agent_videos):
+            count = self._config.held_out_videos
+            videos["agent"] = agent_videos.newest(count)
+        rows = rank_videos(
+            self._components.reward_model,
+            videos,
+            self._demos.expert,
+            reference_rng(self._run.seed, self._counters.agent_steps),
+            self._counters.agent_steps,
+        )
+        append_ranking(self._directory / "ranking.csv", rows)
+        if all(kind in videos for kind in KINDS):
+            scores = ranking_scores(rows)
+            self._log(self._counters.agent_steps, scores.metrics())
+            self._console.print(
+                f"the learned reward on held-out videos: Kendall's tau {scores.kendall_tau:.2f} (a perfect order has "
+                f"{scores.perfect_tau:.2f}), expert above half-good {scores.expert_above_half_good:.0%}, half-good "
+                f"above random {scores.half_good_above_random:.0%}"
+            )
+        elif {"expert", "random"} <= videos.keys():
+            above = expert_above_random(rows)
+            self._log(self._counters.agent_steps, {EXPERT_ABOVE_RANDOM: above})
+            self._console.print(f"the learned reward on held-out videos: expert above random {above:.0%}")
+
+    def showcase(self) -> None:
+        """Expert, agent and random from the same starts, with the reward along them, for the report."""
+        count = self._config.showcase_episodes
+        if not count:
+            return
+        agent, steps = self._components.agent, self._budget.scheduled_steps(self._counters)
+        acts: dict[str, Act] = {
+            "agent": lambda observation: agent.act(observation, steps, explore=False),
+            "random": make_random(self._environment, self._run.seed),
+        }
+        if self._task.has_expert:
+            acts = {"expert": make_expert(self._run.task, self._environment), **acts}
+        episodes = play_showcase(
+            self._environment,
+            acts,
+            evaluation_seeds(self._run.seed, count),
+            self._components.reward_model,
+            self._demos.expert,
+            reference_rng(self._run.seed, self._counters.agent_steps),
+            self._counters.agent_steps,
+        )
+        write_showcase(self._directory, episodes, self._environment.metadata["render_fps"])
