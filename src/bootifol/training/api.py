@@ -22,6 +22,7 @@ from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import EvaluationRow
 from bootifol.files import written_aside
 from bootifol.presets import preset as preset_named
+from bootifol.progress import progress
 from bootifol.reports.html import report
 from bootifol.rewards.registry import check_method
 from bootifol.training.checkpoint import load_checkpoint
@@ -144,26 +145,28 @@ def evaluate_run(
     run = RunConfig.read(Path(directory))
     task = run.resolved_task()
     environment = build_environment(run, task.evaluation_steps)
-    agent, progress = restored_agent(run, Path(directory), environment)
+    agent, saved = restored_agent(run, Path(directory), environment)
+    with progress(f"playing {directory}", episodes) as advance:
 
-    def film(episode: int, played: PlayedEpisode) -> None:
-        if videos is not None:
-            target = Path(videos) / f"episode-{episode}.mp4"
-            write_video(target, played.episode.largest_frames, environment.metadata["render_fps"])
+        def film(episode: int, played: PlayedEpisode) -> None:
+            if videos is not None:
+                target = Path(videos) / f"episode-{episode}.mp4"
+                write_video(target, played.episode.largest_frames, environment.metadata["render_fps"])
+            advance(1)
 
-    results = evaluate_act(
-        environment,
-        lambda observation: agent.act(observation, run.training.interactive.agent_steps, explore=False),
-        evaluation_seeds(seed, episodes),
-        watch=film,
-    )
+        results = evaluate_act(
+            environment,
+            lambda observation: agent.act(observation, run.training.interactive.agent_steps, explore=False),
+            evaluation_seeds(seed, episodes),
+            watch=film,
+        )
     environment.close()
     summary = summarize([result.environment_return for result in results])
     levels = {"expert_return": task.expert_return, "random_return": task.random_return}
     rows = evaluation_rows(
         results,
-        agent_steps=progress.counters.agent_steps,
-        seconds=progress.counters.seconds,
+        agent_steps=saved.counters.agent_steps,
+        seconds=saved.counters.seconds,
         episode_steps=task.evaluation_steps,
         **levels,
     )

@@ -92,11 +92,8 @@ class Measurements:
         if description is None:
             results = evaluate(environment, act, seeds)
         else:
-            results = []
             with progress(description, episodes) as advance:
-                for seed in seeds:
-                    results += evaluate(environment, act, [seed])
-                    advance(1)
+                results = evaluate(environment, act, seeds, watch=lambda _, __: advance(1))
         environment.close()
         at_evaluation_length = episode_steps == self._task.evaluation_steps
         rows = evaluation_rows(
