@@ -265,7 +265,7 @@ def medians(works: Sequence[Work], runs: int, block: int) -> list[float]:
 @command()
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--threads", type=int, default=torch.get_num_threads())
+    parser.add_argument("--threads", type=int, default=1, help="that PyTorch computes with (1)")
     parser.add_argument(
         "--runs", type=int, default=3, help="timed runs of the slow stages; quick ones get more"
     )

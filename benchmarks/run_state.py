@@ -19,6 +19,7 @@ from bootifol.files import read_json, written_aside
 from bootifol.progress import duration
 from bootifol.reports.comparison import decisive, unfinished_because
 from bootifol.reports.run_files import read_run
+from bootifol.training.config import TrainingConfig
 
 State = Literal["not begun", "begun", "done", "failed"]
 
@@ -121,13 +122,13 @@ def check_is_planned(run: PlannedRun, directory: Path, time_budget: float | None
     found = {name: there.get(name) for name in wanted}
     if run.system.method != RANDOM:  # which learns nothing, and has no budget
         # What JSON makes of it, as it was written there.
-        planned = json.loads(json.dumps(dataclasses.asdict(run.config)))
-        written = decisive(there.get("config", {}), run.system.method)
-        # A field that is newer than the run is none that it can differ in.
-        fields = {
-            name: value for name, value in decisive(planned, run.system.method).items() if name in written
-        }
-        wanted |= {"time_budget": time_budget, **fields}
+        planned, default = (
+            decisive(json.loads(json.dumps(dataclasses.asdict(config))), run.system.method)
+            for config in (run.config, TrainingConfig())
+        )
+        # A run that is older than a field was made as the field's default says.
+        written = default | decisive(there.get("config", {}), run.system.method)
+        wanted |= {"time_budget": time_budget, **planned}
         found |= {"time_budget": there.get("time_budget"), **written}
     for name, value in wanted.items():
         if found[name] != value:

@@ -5,7 +5,8 @@
 
 Every stage is timed on the preset's own sizes, with the videos and the replay of a run after its warm-up: medians of
 `--runs` calls after one that is not counted. How often each happens in the preset's own count of agent steps, without
-a time budget, follows from its configuration, so no run has to be played to its end. The floor is what the machine
+a time budget, follows from its configuration, so no run has to be played to its end; the final evaluation, the showcase
+and the report are not counted. The floor is what the machine
 could not beat: the stage's arithmetic, as PyTorch counts it, at the measured rate of a large bf16 matrix product.
 Markdown.
 """
@@ -23,6 +24,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import tyro
 from rich.console import Console
 from torch.utils.flop_counter import FlopCounterMode
@@ -31,12 +33,14 @@ from benchmarks.command import command
 from benchmarks.engine import measured_rates
 from benchmarks.rows import markdown
 from bootifol.cli.train import preset_of
+from bootifol.demos.augmentation import augmented
 from bootifol.evaluation.ranking import draw_references
 from bootifol.progress import progress
 from bootifol.tracking import Tracker
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
+from bootifol.types import Video, VideoSource
 
 HEADER = ("stage", "in a run", "ms each", "floor ms", "ms an agent step", "share")
 
@@ -63,16 +67,18 @@ def stages_of(run: Run) -> Iterator[Stage]:
     config, parts, interactive = run.run.training, run.components, run.interactive
     steps, warm_up = config.interactive.agent_steps, config.agent.warm_up_steps
     acting, model, agent = steps - warm_up, parts.reward_model, parts.agent
-    until = steps if model.keeps_learning else min(config.interactive.reward_updates_until, steps)
     updates = acting / config.agent.update_every
-    reward_updates = max(until - warm_up, 0) / config.interactive.reward_update_every
 
-    alignment = model.align(run.demos.expert, run.demos.random)
+    expert, random, agent_videos = (
+        augmented(videos, run.demos.augmentation)
+        for videos in (run.demos.expert, run.demos.random, parts.agent_videos)
+    )
+    alignment = model.align(expert, random)
     if config.alignment.gradient_steps and next(alignment, None) is not None:
         yield Stage("alignment step", config.alignment.gradient_steps, functools.partial(next, alignment))
     if parts.demonstrations is not None:
         shown, rng = parts.demonstrations, run.rng
-        phases = shown.config.phases
+        phases = cloning_phases(config)
         yield Stage(
             "Cloning Phase: gradient step of the inverse dynamics",
             phases * shown.config.inverse_dynamics_updates,
@@ -107,19 +113,42 @@ def stages_of(run: Run) -> Iterator[Stage]:
     )
     batch = interactive._batch(config.agent.batch_size)
     yield Stage("update of the agent", updates, lambda: agent.update(batch, 0))
-    if reward_updates:
-        yield Stage(
-            "gradient step of the reward",
-            reward_updates,
-            lambda: model.update(run.demos.expert, parts.agent_videos),
-        )
+    if not model.reads_environment_reward:
+        yield from reward_stages(run, expert, agent_videos)
+    # One every so many agent steps, and one after every Cloning Phase.
+    evaluations = steps // config.evaluation.every + (cloning_phases(config) if parts.demonstrations else 0)
+    yield Stage(
+        "evaluation on the way",
+        evaluations,
+        run.measurements.returns_on_the_way,
+        computes=False,
+        slow=True,
+    )
+    yield Stage(
+        f"checkpoint, each {config.checkpoint_minutes:g} minutes", 0, run._checkpoint, False, slow=True
+    )
+
+
+def reward_stages(run: Run, expert: VideoSource, agent_videos: VideoSource) -> Iterator[Stage]:
+    """What a learned reward does while the agent acts."""
+    config, parts, interactive = run.run.training, run.components, run.interactive
+    steps, model, length = config.interactive.agent_steps, run.components.reward_model, run.task.episode_steps
+    until = steps if model.keeps_learning else min(config.interactive.reward_updates_until, steps)
+    version = model.version
+    model.update(expert, agent_videos)
+    if model.version == version:  # it learns only before the agent acts
+        until = 0
+    updates = max(until - config.agent.warm_up_steps, 0) / config.interactive.reward_update_every
+    if updates:
+        yield Stage("gradient step of the reward", updates, lambda: model.update(expert, agent_videos))
         if config.interactive.relabel_episodes:
-            yield Stage(
-                "renewing a stored episode's rewards",
-                reward_updates * config.interactive.relabel_episodes,
-                interactive._relabel_one,
-            )
+            renewed = updates * config.interactive.relabel_episodes
+            yield Stage("renewing a stored episode's rewards", renewed, interactive._relabel_one)
     video, numbers = parts.agent_videos[0], itertools.count()
+    if parts.backbone is not None:
+        backbone, size = parts.backbone, config.pictures.video_size
+        seen = Video("seen", np.zeros((length + 1, size, size, 3), np.uint8))
+        yield Stage("features of an episode", steps / length, lambda: backbone.with_features(seen))
     references = draw_references(model, run.demos.expert, run.rng)
 
     def label_anew() -> None:
@@ -127,15 +156,16 @@ def stages_of(run: Run) -> Iterator[Stage]:
         model.label(video, unknown)
 
     # As soon as the reward has learned, nothing is left of the encodings of expert videos.
-    length = run.task.episode_steps
-    yield Stage("rewarding an episode while the reward learns", until / length, label_anew)
+    if until:
+        yield Stage("rewarding an episode while the reward learns", until / length, label_anew)
     at_rest = (steps - until) / length
     yield Stage("rewarding an episode when it rests", at_rest, lambda: model.label(video, references))
-    evaluations = steps / config.evaluation.every
-    yield Stage(
-        "evaluation on the way", evaluations, run.measurements.returns_on_the_way, computes=False, slow=True
-    )
-    yield Stage("checkpoint, each 20 minutes", 0, run._checkpoint, computes=False, slow=True)
+
+
+def cloning_phases(config: TrainingConfig) -> int:
+    """How many there are in so many agent steps."""
+    after = config.interactive.agent_steps - config.agent.warm_up_steps
+    return min(config.demonstrations.phases, 1 + max(after - 1, 0) // config.demonstrations.repeat_every)
 
 
 def warm_up(run: Run) -> None:

@@ -42,12 +42,13 @@ Moment = Sequence[RankingRow]
 def rows_of(group: Group) -> tuple[str, ...]:
     """The cells of a group of seeds; a dash where a run ranked nothing, as the true reward does."""
     moments = [run.ranking_moments() for run in group.runs]
-    first = [each[0] for each in moments if 0 in each]
-    last = [each[max(each)] for each in moments if each]
+    first = [each.get(0, []) for each in moments]
+    last = [each[max(each)] if each else [] for each in moments]
 
     def cell(of: Callable[[Moment], float | None], ranked: Sequence[Moment]) -> str:
         found = [of(moment) for moment in ranked]
-        return ", ".join(f"{value:.2f}" for value in found if value is not None) or "–"
+        told = ["–" if value is None else f"{value:.2f}" for value in found]
+        return ", ".join(told) if set(told) != {"–"} else "–"
 
     return (
         task_title(group.task),

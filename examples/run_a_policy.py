@@ -30,4 +30,6 @@ def play(run: str, seed: int = 0) -> float:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        raise SystemExit(__doc__)
     print(f"return {play(sys.argv[1]):.1f}")

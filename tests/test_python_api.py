@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import bootifol
@@ -24,13 +25,18 @@ def test_the_readmes_lines_run(tmp_path: Path) -> None:
         interactive=replace(config.interactive, agent_steps=300),
         tensorboard=False,
     )
-    bootifol.record_demos("drawn_reach", tmp_path / "demos", episodes=12, pictures=pictures)
-    run = bootifol.train("drawn_reach", tmp_path / "demos", tmp_path / "run", preset="smoke", config=config)
+    demos, out = str(tmp_path / "demos"), str(tmp_path / "run")
+    bootifol.record_demos("drawn_reach", demos, episodes=12, pictures=pictures)
+    run = bootifol.train("drawn_reach", demos, out, preset="smoke", config=config)
     assert (run.directory, run.finished) == (tmp_path / "run", True)
-    assert isinstance(bootifol.evaluate(tmp_path / "run", episodes=1).scaled_return, float)
-    rewards = bootifol.score(tmp_path / "run", [tmp_path / "demos" / "expert"])
+    assert isinstance(bootifol.evaluate(run, episodes=1).scaled_return, float)
+    policy = bootifol.load_policy(run)
+    assert policy.act(np.zeros((40, 50, 3), np.uint8)).shape == (2,)
+    rewards = bootifol.score(run, [f"{demos}/expert"])
     assert len(rewards) == 12
-    assert bootifol.report([tmp_path / "run"], tmp_path / "report.html").is_file()
+    assert bootifol.report([run], f"{out}/report.html").is_file()
+    assert "Drawn Reach" in bootifol.table([run])
+    assert bootifol.resume(out), "it has ended already"
 
 
 def test_every_public_name_exists() -> None:

@@ -10,6 +10,7 @@ Letters used in every shape comment:
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -17,6 +18,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import torch
 from numpy.typing import NDArray
+
+AnyPath = str | os.PathLike[str]
+"""A path however it is written."""
 
 Frame = NDArray[np.uint8]
 """One RGB picture, uint8 `[H, W, 3]`."""

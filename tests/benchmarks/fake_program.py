@@ -53,11 +53,10 @@ def main(words: list[str]) -> int:
 
 
 def write_config(out: Path, header: dict[str, object]) -> None:
-    config = {
-        "alignment": {"gradient_steps": 60},
-        "interactive": {"agent_steps": 240},
-        "evaluation": {"final_episodes": 1},
-    }
+    """With the configuration in the file FAKE_CONFIG, else with the fewest fields that say how long it is."""
+    config = {"interactive": {"agent_steps": 240}, "evaluation": {"final_episodes": 1}}
+    if "FAKE_CONFIG" in os.environ:
+        config = json.loads(Path(os.environ["FAKE_CONFIG"]).read_text())
     (out / "config.json").write_text(json.dumps(header | {"time_budget": None, "config": config}))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import fcntl
 import functools
 import itertools
@@ -27,7 +28,7 @@ AS_FAKED: Overrides = (
     ("agent.warm_up_steps", 60),
     ("evaluation.final_episodes", 1),
 )
-"""What `fake_program.py` writes of a run's configuration."""
+"""So short is what `fake_program.py` plays."""
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_program.py")))
 
@@ -44,6 +45,9 @@ def suite(tmp_path: Path, demo_set: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
     """A directory to work in, where `demos record` will find what to give."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("FAKE_DEMOS", str(demo_set))
+    (planned_run,) = planned("bootifol")
+    (tmp_path / "config").write_text(json.dumps(dataclasses.asdict(planned_run.config)))
+    monkeypatch.setenv("FAKE_CONFIG", str(tmp_path / "config"))
     return tmp_path
 
 
@@ -195,6 +199,20 @@ def test_a_run_begun_otherwise_is_refused(suite: Path) -> None:
     without = System("bootifol", overrides=(*AS_FAKED, ("alignment.gradient_steps", 0)))
     with pytest.raises(BootifolError, match=r"begun with alignment\.gradient_steps 60, and this suite has 0"):
         queue(suite, [PlannedRun("drawn_home", "smoke", without, 1)])
+
+
+def test_a_run_that_is_older_than_a_field_has_its_default(suite: Path) -> None:
+    queue(suite, planned("bootifol")).work()
+    path = suite / "out" / "drawn_home" / "bootifol" / "seed1" / "config.json"
+    header = json.loads(path.read_text())
+    del header["config"]["reward"]["bootifol"]["spoiled_share"]
+    path.write_text(json.dumps(header))
+    queue(suite, planned("bootifol"))
+    spoiled = System("bootifol", overrides=(*AS_FAKED, ("reward.bootifol.spoiled_share", 0.5)))
+    with pytest.raises(
+        BootifolError, match=r"begun with reward\.bootifol\.spoiled_share 0\.0, and .* has 0\.5"
+    ):
+        queue(suite, [PlannedRun("drawn_home", "smoke", spoiled, 1)])
 
 
 def test_kept_results_stand_for_the_run_on_another_machine(suite: Path) -> None:

@@ -42,7 +42,12 @@ def test_how_often_a_stage_happens_follows_from_the_configuration(demos: Path, t
         agent=replace(CONFIG.agent, warm_up_steps=60, update_every=10),
         interactive=replace(CONFIG.interactive, reward_update_every=25, relabel_episodes=3),
         demonstrations=replace(
-            CONFIG.demonstrations, videos=2, phases=2, inverse_dynamics_updates=7, cloning_updates=5
+            CONFIG.demonstrations,
+            videos=2,
+            phases=4,
+            repeat_every=90,
+            inverse_dynamics_updates=7,
+            cloning_updates=5,
         ),
         evaluation=replace(CONFIG.evaluation, every=120),
     )
@@ -59,9 +64,21 @@ def test_how_often_a_stage_happens_follows_from_the_configuration(demos: Path, t
         "renewing a stored episode's rewards": 12,
         "rewarding an episode while the reward learns": 160 / 30,
         "rewarding an episode when it rests": 80 / 30,
-        "evaluation on the way": 2,
+        "evaluation on the way": 2 + 2,  # and one after each of the Cloning Phases, at 60 and 150
         "checkpoint, each 20 minutes": 0,
     }
+
+
+def test_a_method_that_learns_before_the_agent_acts_has_no_stage_of_it_later(
+    demos: Path, tmp_path: Path
+) -> None:
+    stages = counts(demos, tmp_path, "context_translation", CONFIG)
+    assert stages["rewarding an episode when it rests"] == 240 / 30
+    assert not {"gradient step of the reward", "rewarding an episode while the reward learns"} & stages.keys()
+
+
+def test_the_true_reward_learns_and_rewards_nothing(demos: Path, tmp_path: Path) -> None:
+    assert not any("reward" in name for name in counts(demos, tmp_path, "environment", CONFIG))
 
 
 def test_the_table_names_every_stage_and_the_whole(demos: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -38,5 +38,5 @@ def test_a_row_tells_the_ranking_before_acting_and_at_the_end(
     assert main([str(tmp_path)]) == 0
     row = capsys.readouterr().out.splitlines()[2]
     # 15 pairs, 3 of which are ties of kind: a perfect order has 12 / sqrt(12 * 15).
-    assert row.startswith("| Drawn Home | BootIfOL | 1, 2 | 0.89 |")
+    assert row.startswith("| Drawn Home | BootIfOL | 1, 2 | 0.89, – |")
     assert row.endswith("| 0.50, 0.50 | 0.50, 0.50 | 1.50, 1.50 | 0.00, 0.00 |")

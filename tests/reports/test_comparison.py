@@ -117,34 +117,41 @@ def test_runs_of_mixed_versions_are_kept_apart_and_named(tmp_path: Path) -> None
     write_run(tmp_path / "b", seed=2, versions={"bootifol": "0.2.0"})
     write_run(tmp_path / "c", seed=3, versions={"code": "def456"})
     comparison = comparison_of(tmp_path)
-    assert len(comparison.groups) == 3
-    assert "versions.bootifol (0.1.0 / 0.2.0 / 0.1.0)" in comparison.notes[0]
-    assert "versions.code (abc123 / abc123 / def456)" in comparison.notes[0]
+    assert [[run.seed for run in group.runs] for group in comparison.groups] == [[1, 3], [2]]
+    assert "versions.bootifol (0.1.0 / 0.2.0)" in comparison.notes[0]
     assert "torch" not in comparison.notes[0]
+    assert comparison.notes[1] == (
+        "Runs on Reacher Hard were made by different versions of the library's code "
+        f"(abc123: {tmp_path}/{{a,b}}; def456: {tmp_path}/c)."
+    )
 
 
 def test_runs_that_do_not_know_their_code_are_told(tmp_path: Path) -> None:
     for seed in (1, 2):
         path = write_run(tmp_path / str(seed), seed=seed) / "config.json"
-        path.write_text(path.read_text().replace('"code"', '"another"'))
+        path.write_text(path.read_text().replace(', "code": "abc123"', ""))
     (note,) = comparison_of(tmp_path).notes
-    assert note.startswith("2 of 2 runs on Reacher Hard are older than the record of the library's code")
+    assert note.startswith("Runs on Reacher Hard are older than the record of the library's code")
+    write_run(tmp_path / "new", seed=3)
+    comparison = comparison_of(tmp_path)
+    assert len(comparison.groups) == 1, "a seed can be added later"
+    assert f"unknown: {tmp_path}/{{1,2}}; abc123: {tmp_path}/new" in comparison.notes[0]
 
 
-def test_the_same_videos_may_lie_anywhere_and_others_are_told(tmp_path: Path) -> None:
+def test_other_videos_are_told(tmp_path: Path) -> None:
     def videos(count: int, digest: str) -> dict[str, dict[str, object]]:
         return {"expert": {"count": count, "digest": digest}}
 
     write_run(tmp_path / "a", seed=1, videos=videos(100, "aa"))
     write_run(tmp_path / "b", seed=2, videos=videos(100, "bb"))
-    write_run(tmp_path / "c", seed=3, videos=videos(200, "bb"))
-    moved = write_run(tmp_path / "d", seed=4, videos=videos(100, "aa")) / "config.json"
-    moved.write_text(moved.read_text().replace("demos/reacher_hard", "elsewhere"))
+    write_run(tmp_path / "c", seed=3, videos=videos(100, "aa"))
+    write_run(tmp_path / "old", seed=4)
+    write_run(tmp_path / "d", method="environment", videos=videos(7, "cc"))
     comparison = comparison_of(tmp_path)
-    assert [[run.seed for run in group.runs] for group in comparison.groups] == [[1, 2, 4], [3]]
-    assert "videos.expert (100 / 200)" in comparison.notes[0]
-    assert "expert videos that were not the same" in comparison.notes[1]
-    assert "aa (2 runs), bb (2 runs)" in comparison.notes[1]
+    assert [len(group.runs) for group in comparison.groups] == [3 + 1, 1]
+    (note,) = comparison.notes
+    assert "expert videos that were not the same" in note
+    assert note.endswith("100 of digest aa (2 runs), 100 of digest bb (1 run).")
 
 
 def test_a_time_budget_on_different_processors_is_told(tmp_path: Path) -> None:

@@ -7,6 +7,8 @@ import pytest
 
 from bootifol.errors import BootifolError
 from bootifol.presets import CPU, PAPER, PRESETS
+from bootifol.reports.run_files import read_run
+from bootifol.training import run_config
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
 
@@ -72,3 +74,17 @@ def test_the_paper_preset_is_the_papers_table() -> None:
     assert (agent.noise_clip, agent.target_rate, agent.update_every, agent.shift) == (0.3, 0.01, 2, 4)
     assert (agent.replay_capacity, agent.warm_up_steps) == (100_000, 1920)
     assert paper.demonstrations.share == 0 and agent.cloning_weight == 0
+
+
+def test_a_run_that_goes_on_with_other_code_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    RunConfig("drawn_reach", "bootifol", "cpu", 3, "demos", None, CPU).write(tmp_path, [])
+    began = read_run(tmp_path).versions
+    RunConfig.note_resumed(tmp_path, 100)
+    assert "resumed" not in json.loads((tmp_path / "config.json").read_text()), "nothing has changed"
+    monkeypatch.setattr(run_config, "versions", lambda: began | {"code": "another"})
+    for agent_steps in (200, 300):
+        RunConfig.note_resumed(tmp_path, agent_steps)
+    (stage,) = json.loads((tmp_path / "config.json").read_text())["resumed"]
+    assert stage["agent_steps"] == 200
+    assert read_run(tmp_path).versions == began | {"code": f"{began['code']}, then another"}
+    assert RunConfig.read(tmp_path).seed == 3

@@ -60,9 +60,15 @@ def record(
         return STOPPED
     if "half_good" in (behaviors or ()) and "half_good" not in recorded:
         print(f"half_good videos were left out: no expert is bundled for {task} to be half as good as")
-    before = f"demos check {out}" if "expert" in recorded else f"demos import YOUR_VIDEOS --out {out}"
+    lengths = {"episode-steps": episode_steps, "action-repeat": action_repeat}
+    others = "".join(f" --{name} {value}" for name, value in lengths.items() if value is not None)
+    before = (
+        f"demos check {out}{f' --task {task}{others}' if others else ''}"
+        if "expert" in recorded
+        else f"demos import YOUR_VIDEOS --out {out}"
+    )
     manifest = next(iter(recorded.values())).manifest
-    print(f"next: bootifol {before}, then bootifol {_train_words(task, out, manifest)}")
+    print(f"next: bootifol {before}, then bootifol {_train_words(task, out, manifest)}{others}")
     return 0
 
 

@@ -35,10 +35,12 @@ def evaluate(
     from bootifol.evaluation.tables import PlayedRow, write_played
     from bootifol.training.api import evaluate_run
     from bootifol.training.run_config import RunConfig
+    from bootifol.training.saved_policy import require_checkpoint
 
     folders = _checked(runs, out, videos)
     for run in runs:
-        RunConfig.read(run)  # what is no run is heard of before another is played
+        RunConfig.read(run)  # what cannot be played is heard of before another is
+        require_checkpoint(run)
     console = Console(emoji=False)
     rows: list[PlayedRow] = []
     lines: list[str] = []

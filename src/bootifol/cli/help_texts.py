@@ -12,14 +12,14 @@ from typing import Any
 
 import docstring_parser
 
-_CONTINUED_LINE = re.compile(r"\n {12,}(?=\S)")
-"""Where the description of an argument goes on in the next line of a docstring."""
+_CONTINUED_LINE = re.compile(r"\n {8,}(?=\S)")
+"""Where the description of an argument goes on in the next line of a docstring without its own indentation."""
 
 
 def join_lines(command: Callable[..., Any]) -> None:
     """Joins the lines that tyro would keep apart, of a command's arguments and of the settings that it takes."""
     function = command.func if isinstance(command, functools.partial) else command
-    function.__doc__ = _CONTINUED_LINE.sub(" ", function.__doc__ or "")
+    function.__doc__ = _CONTINUED_LINE.sub(" ", inspect.cleandoc(function.__doc__ or ""))
     for kind in _settings_of(function):
         _join_lines_of_fields(kind)
 

@@ -62,7 +62,7 @@ def tasks(
     if measure:
         console.print(_measured(listed, measure))
     for task in listed if names else []:
-        console.print(_how_to_import(task), soft_wrap=True, highlight=False)
+        console.print(_how_to_import(task), soft_wrap=True, highlight=False, markup=False)
     return 0
 
 

@@ -28,8 +28,10 @@ SHOWN_DIFFERENCES = 6
 LONGEST_VARIANT = 3
 """Fields that a variant may be named by; where more would be needed, variants have letters."""
 
-TOLD_APART = ("processor",)
-"""Of `versions`: what keeps no runs apart, but is told."""
+TOLD_APART = ("code", "processor")
+"""Of `versions`: what keeps no runs apart, but is told. Else no seed could be added after the next edit."""
+
+READ_NO_VIDEOS = LEARN_NOTHING | {"environment"}
 
 
 @dataclass(frozen=True)
@@ -127,12 +129,9 @@ def unfinished_because(run: RunFiles) -> str | None:
 
 def terms(run: RunFiles) -> dict[str, str]:
     """Everything but the seed that a run's numbers depend on, by name; without the sections of other methods."""
-    config = decisive(run.config, run.method)
     versions = {f"versions.{name}": value for name, value in run.versions.items() if name not in TOLD_APART}
-    videos = {f"videos.{behavior}": str(each.get("count")) for behavior, each in run.videos.items()}
-    # Where the videos themselves are known, it does not matter where they lie.
-    where = {} if videos else {"demos": run.demos}
-    return {"time_budget": str(run.time_budget), **where, **videos, **config, **versions}
+    config = decisive(run.config, run.method)
+    return {"time_budget": str(run.time_budget), "demos": run.demos, **config, **versions}
 
 
 def decisive(config: Mapping[str, Any], method: str) -> dict[str, str]:
@@ -260,24 +259,31 @@ def _unequal(groups: Sequence[Group], compared: Collection[str]) -> list[str]:
 
 
 def _unseen(groups: Sequence[Group]) -> list[str]:
-    """What keeps no runs apart and yet bears on a comparison: unknown code, other videos, other processors."""
+    """What keeps no runs apart and yet bears on a comparison: other code, other videos, other processors."""
     task, runs = task_title(groups[0].task), [run for group in groups for run in group.runs]
     notes = []
-    unknown = sum("code" not in run.versions for run in runs)
-    if unknown:
+    by_code: dict[str, list[RunFiles]] = {}
+    for run in runs:
+        by_code.setdefault(run.versions.get("code", "unknown"), []).append(run)
+    if len(by_code) > 1:
+        told = "; ".join(f"{code}: {paths_of(of_code)}" for code, of_code in by_code.items())
+        notes.append(f"Runs on {task} were made by different versions of the library's code ({told}).")
+    elif "unknown" in by_code:
         notes.append(
-            f"{unknown} of {len(runs)} runs on {task} are older than the record of the library's code, so nothing here "
-            "tells whether they are of one version."
+            f"Runs on {task} are older than the record of the library's code, so nothing here tells whether they are "
+            "of one version."
         )
-    learners = [run for run in runs if run.method not in LEARN_NOTHING]
-    for behavior in dict.fromkeys(behavior for run in learners for behavior in run.videos):
-        digests = [str(run.videos[behavior].get("digest")) for run in learners if behavior in run.videos]
-        if len(set(digests)) > 1:
+    shown = [run for run in runs if run.method not in READ_NO_VIDEOS]
+    for behavior in dict.fromkeys(behavior for run in shown for behavior in run.videos):
+        found = [run.videos[behavior] for run in shown if behavior in run.videos]
+        sets = [f"{each.get('count')} of digest {each.get('digest')}" for each in found]
+        if len(set(sets)) > 1:
             notes.append(
                 f"Runs on {task} learned from {behavior} videos that were not the same, such as those recorded on "
-                f"another machine or at another size: {_counted(digests)}."
+                f"another machine or at another size: {_counted(sets)}."
             )
-    processors = [run.versions.get("processor", "unknown") for run in learners if run.time_budget is not None]
+    learners = [run for run in runs if run.method not in LEARN_NOTHING and run.time_budget is not None]
+    processors = [run.versions.get("processor", "unknown") for run in learners]
     if len(set(processors)) > 1:
         notes.append(
             f"Runs on {task} had their time on different processors, on which it buys more or less: "

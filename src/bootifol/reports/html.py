@@ -22,6 +22,7 @@ from bootifol.reports.names import task_title
 from bootifol.reports.plots import RunLook, looks_of
 from bootifol.reports.run_files import COUNTERS, RunFiles, flattened, read_run
 from bootifol.reports.style import KIND_COLORS, svg_data_uri, thousands
+from bootifol.types import AnyPath
 
 SHOWN_STARTS = 4
 """Starts shown with pictures and videos; more would make the file heavy and tell little."""
@@ -149,7 +150,7 @@ LOSSES = {
 """Title and caption of each loss."""
 
 
-def report(run_dirs: Sequence[Path], out: Path) -> Path:
+def report(run_dirs: Sequence[AnyPath], out: AnyPath) -> Path:
     """Writes the report of one run, or of several side by side, and returns its path.
 
     Args:
@@ -161,19 +162,20 @@ def report(run_dirs: Sequence[Path], out: Path) -> Path:
     """
     if not run_dirs:
         raise BootifolError("there is no run to report on; name the directory of one at least")
-    runs = [read_run(run_dir) for run_dir in run_dirs]
+    directories, target = [Path(run_dir) for run_dir in run_dirs], Path(out)
+    runs = [read_run(directory) for directory in directories]
     looks = looks_of(runs)
     page = _template_environment().get_template("page.html")
     html = page.render(
         title=_title(runs),
         sections=[_section(look, f"run-{number}", alone=len(runs) == 1) for number, look in enumerate(looks)],
         comparison=_curve_cards(looks) + _loss_cards(looks) if len(runs) > 1 else [],
-        report_command=shlex.join(["bootifol", "report", *map(str, run_dirs), "--out", str(out)]),
+        report_command=shlex.join(["bootifol", "report", *map(str, directories), "--out", str(target)]),
         kind_colors=KIND_COLORS,
     )
-    with written_aside(out) as aside:
+    with written_aside(target) as aside:
         aside.write_text(html)
-    return out
+    return target
 
 
 def _template_environment() -> Environment:

@@ -227,7 +227,7 @@ def read_run(run_dir: Path) -> RunFiles:
         time_budget=float(time_budget) if isinstance(time_budget, int | float) else None,
         command=_as_text(header.get("command", "")),
         config=_as_mapping(header.get("config"), "config", notes),
-        versions={k: str(v) for k, v in _as_mapping(header.get("versions"), "versions", notes).items()},
+        versions=_versions(header, notes),
         videos={
             k: v
             for k, v in _as_mapping(header.get("videos", {}), "videos", notes).items()
@@ -268,6 +268,21 @@ def _as_mapping(value: object, what: str, notes: list[str]) -> dict[str, Any]:
         return value
     notes.append(f"config.json has no table of {what}.")
     return {}
+
+
+def _versions(header: Mapping[str, Any], notes: list[str]) -> dict[str, str]:
+    """What the run was begun with; where it was resumed with something else, `the one, then the other`."""
+    found = {
+        name: str(value) for name, value in _as_mapping(header.get("versions"), "versions", notes).items()
+    }
+    resumed = header.get("resumed", [])
+    for stage in resumed if isinstance(resumed, list) else []:
+        later = stage.get("versions", {}) if isinstance(stage, dict) else {}
+        for name, value in later.items():
+            before = found.get(name, "unknown")
+            if before.split(", then ")[-1] != str(value):
+                found[name] = f"{before}, then {value}"
+    return found
 
 
 def _read_metrics(path: Path, notes: list[str]) -> tuple[dict[tuple[str, str], Curve], list[float]]:

@@ -12,6 +12,7 @@ from bootifol.files import written_aside
 from bootifol.reports.names import task_title
 from bootifol.reports.result_tables import Measure, ResultRow, Results, ResultTable, number, result_tables
 from bootifol.reports.run_files import find_runs, read_run
+from bootifol.types import AnyPath
 
 HEADER = ("Task", "Agent", "Seeds", "Episodes", "Mean [95 %]", "IQM [95 %]", "Paper")
 
@@ -25,9 +26,7 @@ NOTHING = "–"
 """Where nothing was run, or the paper has no number."""
 
 
-def table(
-    paths: Sequence[Path | str], out: Path | str | None = None, tasks: Collection[str] | None = None
-) -> str:
+def table(paths: Sequence[AnyPath], out: AnyPath | None = None, tasks: Collection[str] | None = None) -> str:
     """The paper's result tables from runs, as Markdown; written to a file on request.
 
     Args:

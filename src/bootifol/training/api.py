@@ -32,22 +32,25 @@ from bootifol.training.interactive import evaluation_seeds
 from bootifol.training.run_config import RunConfig
 from bootifol.training.saved_policy import require_checkpoint, restored_agent
 from bootifol.training.train import Run
-from bootifol.types import Rewards, Video
+from bootifol.types import AnyPath, Rewards, Video
 
 
 @dataclass(frozen=True)
 class TrainedRun:
-    """What `train_policy` leaves."""
+    """What `train_policy` leaves. It stands for its directory wherever a path does."""
 
     directory: Path
     finished: bool
     """False if it was asked to stop before its end: `continue_run` goes on."""
 
+    def __fspath__(self) -> str:
+        return str(self.directory)
+
 
 def train_policy(
     task: str,
-    demos: Path | str,
-    out: Path | str,
+    demos: AnyPath,
+    out: AnyPath,
     *,
     method: str = "bootifol",
     preset: str = "cpu",
@@ -98,7 +101,7 @@ def train_policy(
     return TrainedRun(directory, finished=_learn_and_report(learner))
 
 
-def continue_run(directory: Path | str) -> bool:
+def continue_run(directory: AnyPath) -> bool:
     """Goes on with a run from its newest checkpoint, to its end, its final evaluation and its report.
 
     Returns:
@@ -129,7 +132,7 @@ class RunEvaluation:
 
 
 def evaluate_run(
-    directory: Path | str, episodes: int = 10, seed: int = 1000, videos: Path | str | None = None
+    directory: AnyPath, episodes: int = 10, seed: int = 1000, videos: AnyPath | None = None
 ) -> RunEvaluation:
     """Plays a run's newest policy, without exploration, in episodes of the task's evaluation length.
 
@@ -146,7 +149,7 @@ def evaluate_run(
     task = run.resolved_task()
     environment = build_environment(run, task.evaluation_steps)
     agent, saved = restored_agent(run, Path(directory), environment)
-    with progress(f"playing {directory}", episodes) as advance:
+    with progress(f"playing {Path(directory)}", episodes) as advance:
 
         def film(episode: int, played: PlayedEpisode) -> None:
             if videos is not None:
@@ -173,7 +176,7 @@ def evaluate_run(
     return RunEvaluation(results, summary, scaled_return(summary.mean, **levels), task.evaluation_steps, rows)
 
 
-def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[str, Rewards]:
+def score_videos(directory: AnyPath, videos: Sequence[AnyPath]) -> dict[str, Rewards]:
     """The learned reward along videos, each compared with the same expert videos where the method compares.
 
     Args:
@@ -187,7 +190,7 @@ def score_videos(directory: Path | str, videos: Sequence[Path | str]) -> dict[st
     return {video.name: rewards for video, rewards in scored_videos(directory, videos)}
 
 
-def scored_videos(directory: Path | str, videos: Sequence[Path | str]) -> Iterator[tuple[Video, Rewards]]:
+def scored_videos(directory: AnyPath, videos: Sequence[AnyPath]) -> Iterator[tuple[Video, Rewards]]:
     """The same one by one, with the pictures that were scored.
 
     Raises:
@@ -220,7 +223,7 @@ def write_scores(path: Path, scores: dict[str, Rewards]) -> None:
             writer.writerows([name, step, f"{reward:.6g}"] for step, reward in enumerate(rewards))
 
 
-def _run_with_demos(directory: Path | str) -> RunConfig:
+def _run_with_demos(directory: AnyPath) -> RunConfig:
     """A run's configuration, once its method and its videos are seen to be where it looks for them."""
     run = RunConfig.read(Path(directory))
     check_method(run.method)

@@ -56,6 +56,16 @@ class RunConfig:
             },
         )
 
+    @staticmethod
+    def note_resumed(directory: Path, agent_steps: int) -> None:
+        """Adds to `config.json` what goes on with the run, if it is not what it has been until now."""
+        path = directory / "config.json"
+        data = read_json(path, "the run's configuration")
+        stages = data.get("resumed", [])
+        if (stages[-1] if stages else data).get("versions") != (now := versions()):
+            data["resumed"] = [*stages, {"agent_steps": agent_steps, "versions": now}]
+            write_json(path, data)
+
     @classmethod
     def read(cls, directory: Path) -> RunConfig:
         """Reads `config.json`.

@@ -12,11 +12,12 @@ from bootifol.errors import BootifolError
 from bootifol.training.checkpoint import Progress, load_checkpoint, newest_checkpoint
 from bootifol.training.components import build_agent, build_environment, build_reward_model, sees_encodings
 from bootifol.training.run_config import RunConfig
+from bootifol.types import AnyPath
 
 NAME = "policy.safetensors"
 
 
-def load_policy(run: Path | str) -> Policy:
+def load_policy(run: AnyPath) -> Policy:
     """A run's newest policy, to act with outside of this library; it computes on the CPU.
 
     A run that acts on encodings, or was written before runs had a `policy.safetensors`, is read from its newest

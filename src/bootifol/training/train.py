@@ -114,6 +114,8 @@ class Run:
             True when the run has ended; False when it was asked to stop and can be resumed.
         """
         self._undo_what_followed_the_checkpoint()
+        if newest_checkpoint(self.directory / "checkpoints") is not None:
+            RunConfig.note_resumed(self.directory, self.counters.agent_steps)
         self.tracker = Tracker(self.directory, self.run.training.tensorboard)
         with Interruption() as interruption:
             try:
