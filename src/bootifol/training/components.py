@@ -217,7 +217,7 @@ def build_components(
             config.agent.discount,
             _shift(run),
         ),
-        agent_videos=AgentVideos(*ring),
+        agent_videos=AgentVideos(*ring, config.interactive.failures_share),
         demonstrations=build_demonstrations(run, expert, action_dim) if demonstrated else None,
     )
 

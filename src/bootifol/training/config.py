@@ -8,7 +8,7 @@ from bootifol.agents.config import DrQv2Config
 from bootifol.demos.augmentation import AugmentationConfig
 from bootifol.devices import check_device_name
 from bootifol.envs.pictures import PictureConfig
-from bootifol.errors import require_at_least
+from bootifol.errors import BootifolError, require_at_least
 from bootifol.rewards.registry import RewardConfig
 from bootifol.training.demonstrations import DemonstrationConfig
 
@@ -48,6 +48,11 @@ class InteractiveConfig:
     agent_videos: int = 5000
     """Capacity of D_a: how many of the agent's newest episodes the reward learns from."""
 
+    failures_share: float = 1.0
+    """Beyond the paper: share of the agent's videos, those of the lowest learned reward, that the reward learns from as
+    the other class; 1, as in the paper, all. The better the agent gets, the more of all are successes, and a reward
+    that learns to tell them from the expert's spoils the policy."""
+
     relabel_episodes: int = 0
     """Stored episodes rewarded anew after each update of the reward, drawn at random among those still
     in replay; 0 as in the paper, whose stored rewards go stale."""
@@ -62,6 +67,10 @@ class InteractiveConfig:
             reward_updates_until=self.reward_updates_until,
             relabel_episodes=self.relabel_episodes,
         )
+        if not 0 < self.failures_share <= 1:
+            raise BootifolError(
+                f"interactive.failures_share must be above 0 and at most 1, not {self.failures_share}"
+            )
         require_at_least(
             1,
             reward_update_every=self.reward_update_every,

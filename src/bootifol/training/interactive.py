@@ -81,7 +81,7 @@ class InteractivePhase:
         video = episode.video if self.backbone is None else self.backbone.with_features(episode.video)
         rewards = self.reward_model.label(video, references)
         self.replay.add(episode, rewards)
-        self.agent_videos.add(video)
+        self.agent_videos.add(video, float(rewards.mean()))
         self.counters.episodes += 1
         self.counters.interactive_seconds += self._watch.lap()
         self.averages.add({"episode/learned_reward": float(rewards.mean())})
@@ -143,11 +143,13 @@ class InteractivePhase:
         ids = self.replay.episode_ids
         kept = range(max(ids.start, ids.stop - len(self.agent_videos)), ids.stop)
         episode_id = int(self.rng.integers(kept.start, kept.stop))
-        video = self.agent_videos[episode_id % self.config.agent_videos]
+        slot = episode_id % self.config.agent_videos
+        video = self.agent_videos[slot]
         references = draw_references(self.reward_model, self.expert, self.rng)
         # An episode that ended early stands still in the ring up to the full length; no reward looks ahead at that.
         rewards = self.reward_model.label(video, references)[: self.replay.agent_steps_of(episode_id)]
         self.replay.relabel(episode_id, rewards)
+        self.agent_videos.reward_anew(slot, float(rewards.mean()))
 
 
 def episode_seed(run_seed: int, episode: int) -> int:
