@@ -210,6 +210,17 @@ def encoder_training_ablation(config: TrainingConfig, timed: bool) -> list[Syste
     return systems
 
 
+def failures(config: TrainingConfig, timed: bool) -> list[System]:
+    """A reward that learns to the end of the run from all of the agent's videos, or from its failures alone."""
+    to_the_end = ("interactive.reward_updates_until", config.interactive.agent_steps)
+    return [
+        System("bootifol", "trained_0_percent", (("interactive.reward_updates_until", 0),)),
+        System("bootifol", "trained_100_percent", (to_the_end,)),
+        System("bootifol", "failures_50_percent", (to_the_end, ("interactive.failures_share", 0.5))),
+        System("bootifol", "failures_25_percent", (to_the_end, ("interactive.failures_share", 0.25))),
+    ]
+
+
 def equivalent_steps(config: TrainingConfig, paper_steps: int, timed: bool) -> int:
     """N_train of a run that trains its encoders for the same share of its learning as the paper's did.
 
