@@ -378,6 +378,13 @@ SUITES = {
         THREE_SEEDS,
         learning_test,
     ),
+    "failures": Suite(
+        "beyond the paper: bootstrapping on all of the agent's videos, or on those of the lowest learned reward",
+        "drawn",
+        ("drawn_home",),
+        THREE_SEEDS,
+        failures,
+    ),
     "remedies": Suite(
         "the preset without one of its departures from the paper, or with one more",
         "drawn",
