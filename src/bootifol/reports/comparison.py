@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 from bootifol.progress import duration
@@ -156,10 +157,13 @@ def budget(run: RunFiles) -> str:
 
 def paths_of(runs: Sequence[RunFiles]) -> str:
     """The directories of runs as a shell would expand them: `runs/{seed1,seed2}`."""
-    parents = {run.path.parent for run in runs}
-    if len(runs) == 1 or len(parents) > 1:
-        return ", ".join(str(run.path) for run in runs)
-    return str(parents.pop() / f"{{{','.join(run.path.name for run in runs)}}}")
+    by_parent: dict[Path, list[str]] = {}
+    for run in runs:
+        by_parent.setdefault(run.path.parent, []).append(run.path.name)
+    return ", ".join(
+        str(parent / (names[0] if len(names) == 1 else f"{{{','.join(names)}}}"))
+        for parent, names in by_parent.items()
+    )
 
 
 def _groups(runs: Sequence[RunFiles], agent: Callable[[RunFiles], str], notes: list[str]) -> list[Group]:
