@@ -2,7 +2,7 @@
 
 The plain versions (`benchmarks/plain`) are ordinary PyTorch in fp32; tests hold the same weights and draws to the same
 losses, gradients and rewards. *fp32* is our own code without bf16. Inputs are random, all sides get the same, and they
-are timed in turn, so that a busy machine slows all. Quote the ratios; absolute times belong to a machine.
+are timed in turn, so that a busy machine slows all. Quote the ratios; absolute times belong to a machine. Markdown.
 
 The floor is what the machine could not beat: the plain version's arithmetic (matrix products and convolutions, as
 PyTorch counts them; its fused LSTM is not counted) at the rate of a large matrix product, plus the bytes that must
@@ -22,14 +22,13 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from rich.console import Console
-from rich.table import Column, Table
 from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
 
 from benchmarks.command import command
 from benchmarks.plain.bootifol import PlainBootifol
 from benchmarks.plain.drqv2 import PlainDrQv2, PlainReplay
+from benchmarks.rows import markdown
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.envs.pictures import RenderProfile
 from bootifol.memory import keep_freed_memory
@@ -49,6 +48,8 @@ CONVOLUTIONS = {
     "strided": ((32, 3, 2), (32, 3, 2), (32, 3, 1), (32, 3, 1)),
     "coarse": ((32, 8, 4), (64, 4, 2), (64, 3, 1)),
 }
+
+HEADER = ("sizes", "stage", "ours ms", "fp32 ms", "plain ms", "plain / ours", "floor ms", "floor / ours")
 
 STAGES = ["environment", "meta_world", "update", "alignment", "label"]
 
@@ -275,16 +276,7 @@ def main() -> None:
     keep_freed_memory()
     torch.set_num_threads(arguments.threads)
     rates = measured_rates()
-    table = Table(
-        "sizes",
-        "stage",
-        *(
-            Column(name, justify="right")
-            for name in ("ours ms", "fp32 ms", "plain ms", "plain / ours", "floor ms", "floor / ours")
-        ),
-        title=f"{arguments.threads} thread(s), {rates.arithmetic / 1e9:.0f} GFLOP/s in bf16, copies of "
-        f"{rates.copy / 1e9:.1f} GB/s",
-    )
+    rows: list[list[str]] = []
     presets = {"paper": PAPER, "cpu": CPU}
     with progress("timing", total=len(arguments.stages) * len(arguments.sizes)) as advance:
         for name in arguments.sizes:
@@ -315,18 +307,24 @@ def main() -> None:
                 least = floor(work, rates)
                 sides = [work.ours, work.plain, *([work.fp32] if work.fp32 else [])]
                 ours, plain, *fp32 = medians(sides, runs, work.block)
-                table.add_row(
-                    name,
-                    title,
-                    f"{ours:.1f}",
-                    "".join(f"{each:.1f}" for each in fp32),
-                    f"{plain:.1f}",
-                    f"{plain / ours:.1f}",
-                    "" if least is None else f"{least:.1f}",
-                    "" if least is None else f"{least / ours:.0%}",
+                rows.append(
+                    [
+                        name,
+                        title,
+                        f"{ours:.1f}",
+                        "".join(f"{each:.1f}" for each in fp32),
+                        f"{plain:.1f}",
+                        f"{plain / ours:.1f}",
+                        "" if least is None else f"{least:.1f}",
+                        "" if least is None else f"{least / ours:.0%}",
+                    ]
                 )
                 advance(1)
-    Console().print(table)
+    print(
+        f"{arguments.threads} thread(s), {rates.arithmetic / 1e9:.0f} GFLOP/s in bf16, copies of "
+        f"{rates.copy / 1e9:.1f} GB/s\n"
+    )
+    print(markdown(HEADER, rows))
 
 
 if __name__ == "__main__":
