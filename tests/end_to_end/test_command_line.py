@@ -223,7 +223,7 @@ def test_help_breaks_lines_where_the_terminal_ends_and_not_where_a_docstring_doe
 @pytest.mark.parametrize(
     ("command", "usage"),
     [
-        (["evaluate"], "RUN [--episodes INT]"),
+        (["evaluate"], "RUN [RUN ...]"),
         (["score"], "RUN VIDEO [VIDEO ...] [--out"),
         (["report"], "RUN [RUN ...] [--out"),
         (["table"], "RUN [RUN ...] [--out"),
