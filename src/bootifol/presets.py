@@ -88,7 +88,7 @@ CPU = TrainingConfig(
     ),
     evaluation=EvaluationConfig(every=2500, long_episodes=5, final_episodes=50),
 )
-"""The same algorithm with smaller networks, pictures and counts: an hour to an hour and a half on one core, and 8 GB.
+"""The same algorithm with smaller networks, pictures and counts: one to two hours on one core, and 8 GB.
 
 Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
 `motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `relabel_episodes`, by which stored

@@ -12,20 +12,10 @@ import torch
 from benchmarks.suites import SMALL, PlannedRun, System, backbone_comparison
 
 from benchmarks import cost
-from bootifol.demos.record import record
-from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.presets import CPU
 
 ROW = dict.fromkeys(cost.COLUMNS, "1")
-
-
-@pytest.fixture(scope="module")
-def demos(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("demos")
-    for behavior in ("expert", "random"):
-        record("drawn_home", behavior, 4, directory / behavior, PictureConfig(agent_size=32, video_size=32))
-    return directory
 
 
 def test_a_row_counts_parameters_and_memory(demos: Path) -> None:

@@ -10,22 +10,12 @@ from benchmarks.stages import measure, stages_of, warm_up
 from benchmarks.suites import SMALL, with_overrides
 from rich.console import Console
 
-from bootifol.demos.record import record
-from bootifol.envs.pictures import PictureConfig
 from bootifol.presets import SMOKE
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 
 CONFIG = with_overrides(SMOKE, (*SMALL, ("interactive.reward_updates_until", 160)))
-
-
-@pytest.fixture(scope="module")
-def demos(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("demos")
-    for behavior in ("expert", "random"):
-        record("drawn_home", behavior, 4, directory / behavior, PictureConfig(agent_size=32, video_size=32))
-    return directory
 
 
 def counts(demos: Path, directory: Path, method: str, config: TrainingConfig) -> dict[str, float]:
