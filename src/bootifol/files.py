@@ -7,7 +7,7 @@ import os
 import shutil
 import uuid
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +23,14 @@ from bootifol.types import Arrays
 def written_aside(target: Path) -> Iterator[Path]:
     """Yields a path to write to; on success syncs it and renames it to `target`.
 
-    On any error the half-written file or directory is removed and an existing `target` is untouched.
+    On any error the half-written file or directory is removed, with directories made for it, and an existing `target`
+    is untouched.
 
     Raises:
         BootifolError: the disk is full or not writable.
     """
     aside = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.tmp")
+    missing = [directory for directory in target.parents if not directory.exists()]
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         yield aside
@@ -52,6 +54,10 @@ def written_aside(target: Path) -> Iterator[Path]:
             shutil.rmtree(aside, ignore_errors=True)
         else:
             aside.unlink(missing_ok=True)
+        if not target.exists():
+            for directory in missing:
+                with suppress(OSError):  # others write there by now
+                    directory.rmdir()
 
 
 def write_json(target: Path, value: Any) -> None:

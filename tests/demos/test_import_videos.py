@@ -115,7 +115,7 @@ def test_the_square_that_was_chosen_is_cut_out(tmp_path: Path) -> None:
     assert demo_set.manifest.conversion is not None
     assert demo_set.manifest.conversion["crop"] == [9, 3, 8]
     with pytest.raises(BootifolError, match=r"a\.npy: a crop of 8×8 pixels at 13, 3 .* have 20×12"):
-        import_videos([path], tmp_path / "other", Conversion(frames=4, size=8, crop=(13, 3, 8)))
+        import_videos([path], tmp_path / "other" / "expert", Conversion(frames=4, size=8, crop=(13, 3, 8)))
     assert not (tmp_path / "other").exists()
 
 

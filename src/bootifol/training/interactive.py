@@ -158,6 +158,14 @@ def episode_seed(run_seed: int, episode: int) -> int:
     return int(np.random.SeedSequence([run_seed, 0, episode]).generate_state(1)[0])
 
 
-def evaluation_seeds(run_seed: int, count: int) -> list[int]:
-    """Seeds of evaluation starts, which training never meets."""
-    return [int(np.random.SeedSequence([run_seed, 1, index]).generate_state(1)[0]) for index in range(count)]
+def evaluation_seeds(run_seed: int, count: int, agent_steps: int = 0) -> list[int]:
+    """Seeds of evaluation starts, which training never meets.
+
+    Args:
+        run_seed: of the run.
+        count: of seeds.
+        agent_steps: at which the policy is measured on the way, each time from other starts, so that what they have in
+            common does not hide in the curve; 0 for the final evaluation's.
+    """
+    entropies = ([run_seed, 1, index, agent_steps] for index in range(count))
+    return [int(np.random.SeedSequence(entropy).generate_state(1)[0]) for entropy in entropies]

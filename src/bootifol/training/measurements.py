@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -67,19 +67,21 @@ class Measurements:
 
     def final_returns(self) -> Metrics:
         """Of the final evaluation, by name."""
-        return self._play(self._task.evaluation_steps, self._config.final_episodes, "final evaluation")
+        seeds = evaluation_seeds(self._run.seed, self._config.final_episodes)
+        return self._play(self._task.evaluation_steps, seeds, "final evaluation")
 
     def returns_on_the_way(self) -> None:
-        """Of a few episodes of the training and of the evaluation length."""
+        """Of a few episodes of the training and of the evaluation length, from starts that no other evaluation has."""
         episodes = {self._task.episode_steps: self._config.episodes}
         # Where both lengths are one, it is evaluated once.
         same = episodes.get(self._task.evaluation_steps, 0)
         episodes[self._task.evaluation_steps] = max(same, self._config.long_episodes)
         for episode_steps, count in episodes.items():
             if count:
-                self._play(episode_steps, count)
+                seeds = evaluation_seeds(self._run.seed, count, self._counters.agent_steps)
+                self._play(episode_steps, seeds)
 
-    def _play(self, episode_steps: int, episodes: int, description: str | None = None) -> Metrics:
+    def _play(self, episode_steps: int, seeds: Sequence[int], description: str | None = None) -> Metrics:
         """Plays episodes without noise and appends them to `evaluations.csv`."""
         agent, counters = self._components.agent, self._counters
         environment = build_environment(self._run, episode_steps)
@@ -88,11 +90,10 @@ class Measurements:
         def act(observation: Observation) -> Action:
             return agent.act(observation, steps, explore=False)
 
-        seeds = evaluation_seeds(self._run.seed, episodes)
         if description is None:
             results = evaluate(environment, act, seeds)
         else:
-            with progress(description, episodes) as advance:
+            with progress(description, len(seeds)) as advance:
                 results = evaluate(environment, act, seeds, watch=lambda _, __: advance(1))
         environment.close()
         at_evaluation_length = episode_steps == self._task.evaluation_steps

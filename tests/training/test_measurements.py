@@ -1,0 +1,35 @@
+"""What a run measures of itself, and from which starts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from tiny_runs import ENDS_SOON, new_run
+
+from bootifol.evaluation.tables import read_evaluations
+from bootifol.training.interactive import episode_seed, evaluation_seeds
+
+TWO_ON_THE_WAY = replace(
+    ENDS_SOON,
+    interactive=replace(ENDS_SOON.interactive, agent_steps=150),
+    evaluation=replace(ENDS_SOON.evaluation, every=60, episodes=2, long_episodes=2, final_episodes=2),
+)
+
+
+def test_every_evaluation_has_starts_of_its_own(tmp_path: Path, demos: Path) -> None:
+    run = new_run(tmp_path / "run", demos, config=TWO_ON_THE_WAY)
+    assert run.learn()
+    run.measurements.final_returns()
+    starts: dict[int, list[int]] = {}
+    for row in read_evaluations(tmp_path / "run" / "evaluations.csv").rows:
+        if row.episode_steps == run.run.resolved_task().evaluation_steps:
+            starts.setdefault(row.agent_steps, []).append(row.seed)
+    on_the_way, final = sorted(starts)[:-1], max(starts)
+    assert len(on_the_way) == 2
+    assert starts[final] == evaluation_seeds(run.run.seed, 2)
+    for agent_steps in on_the_way:
+        assert starts[agent_steps] == evaluation_seeds(run.run.seed, 2, agent_steps)
+    every = [seed for seeds in starts.values() for seed in seeds]
+    trained_from = {episode_seed(run.run.seed, episode) for episode in range(10)}
+    assert len({*every} | trained_from) == len(every) + 10
