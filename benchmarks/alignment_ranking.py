@@ -26,13 +26,14 @@ from bootifol.demos.demo_set import DemoSet
 from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.rollout import play_episode
 from bootifol.errors import BootifolError
-from bootifol.evaluation.ranking import KINDS, draw_references, rank_videos, ranking_scores
+from bootifol.evaluation.ranking import KINDS, rank_videos, ranking_scores
 from bootifol.files import written_aside
 from bootifol.memory import keep_freed_memory
 from bootifol.presets import preset
 from bootifol.progress import progress
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
+from bootifol.rewards.references import draw_references
 from bootifol.tasks import make_environment, task_named
 from bootifol.types import Video
 

@@ -21,7 +21,7 @@ from benchmarks.resumable_table import ResumableTable
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.envs.rollout import play_episode
-from bootifol.evaluation.returns import evaluate
+from bootifol.evaluation.returns import evaluate, evaluation_seeds
 from bootifol.experts import make_expert
 from bootifol.presets import preset
 from bootifol.progress import progress
@@ -30,7 +30,7 @@ from bootifol.tasks import make_environment, task_named
 from bootifol.training.cloning import one_cycle
 from bootifol.training.config import TrainingConfig
 from bootifol.training.demonstrations import DemonstrationConfig, Demonstrations
-from bootifol.training.interactive import episode_seed, evaluation_seeds
+from bootifol.training.interactive import episode_seed
 from bootifol.types import Episode, FrameBatch, Video
 
 VARIANTS = {

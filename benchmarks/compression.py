@@ -33,9 +33,10 @@ from bootifol.demos.export_videos import export_videos
 from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.demos.record import HALF_GOOD_VIDEOS
 from bootifol.errors import require_at_least
-from bootifol.evaluation.ranking import KINDS, area_under_curve, draw_references
+from bootifol.evaluation.ranking import KINDS, area_under_curve
 from bootifol.memory import keep_freed_memory
 from bootifol.rewards.base import RewardModel
+from bootifol.rewards.references import draw_references
 from bootifol.tasks import TASKS
 from bootifol.types import Video, VideoSource
 

@@ -28,11 +28,11 @@ from scipy import stats
 
 from benchmarks.command import command
 from bootifol.envs.rollout import Act, play_episode
-from bootifol.evaluation.ranking import draw_references
 from bootifol.experts import make_expert
 from bootifol.files import written_aside
 from bootifol.progress import progress
 from bootifol.reports.style import house_style
+from bootifol.rewards.references import draw_references
 from bootifol.training.components import build_environment
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run

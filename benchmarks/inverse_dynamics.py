@@ -19,11 +19,11 @@ from rich.table import Table
 from benchmarks.command import command
 from bootifol.envs.rollout import play_episode
 from bootifol.errors import BootifolError
+from bootifol.evaluation.returns import evaluation_seeds
 from bootifol.experts import make_expert
 from bootifol.progress import progress
 from bootifol.training.components import build_environment
 from bootifol.training.demonstrations import moving_steps
-from bootifol.training.interactive import evaluation_seeds
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 

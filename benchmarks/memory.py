@@ -50,7 +50,7 @@ from bootifol.memory import keep_freed_memory
 from bootifol.presets import preset
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.training.budget import Budget, Counters
-from bootifol.training.components import Components, build_components, build_environment
+from bootifol.training.components import Components, build_components, build_environment, build_learners
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.run_config import RunConfig
 from bootifol.types import Episode, FrameBatch, Video
@@ -153,7 +153,8 @@ def whole_process(run: RunConfig) -> int:
     keep_freed_memory()
     environment = build_environment(run, frames - 1)
     expert = PixelsOnDemand(config.demonstrations.videos, frames, config.pictures.video_size)
-    parts = build_components(run, environment, expert, Console(stderr=True))
+    learners = build_learners(run, environment)
+    parts = build_components(run, environment, learners, expert, Console(stderr=True))
     fill(parts.replay, frames, config.pictures.agent_size, actions_of(environment))
     for index in range(config.interactive.agent_videos):
         parts.agent_videos.add(expert[index])

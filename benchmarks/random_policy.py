@@ -17,14 +17,13 @@ import tyro
 from benchmarks.command import command
 from bootifol.cli.train import preset_of
 from bootifol.envs.rollout import Act
-from bootifol.evaluation.returns import EpisodeResult, evaluate, evaluation_rows
+from bootifol.evaluation.returns import EpisodeResult, evaluate, evaluation_rows, evaluation_seeds
 from bootifol.evaluation.tables import append_evaluations
 from bootifol.experts import make_random
 from bootifol.progress import progress
 from bootifol.reports.html import report
 from bootifol.training.components import build_environment
 from bootifol.training.config import TrainingConfig
-from bootifol.training.interactive import evaluation_seeds
 from bootifol.training.run_config import RunConfig
 
 

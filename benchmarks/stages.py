@@ -34,8 +34,8 @@ from benchmarks.engine import measured_rates
 from benchmarks.rows import markdown
 from bootifol.cli.train import preset_of
 from bootifol.demos.augmentation import augmented
-from bootifol.evaluation.ranking import draw_references
 from bootifol.progress import progress
+from bootifol.rewards.references import draw_references
 from bootifol.tracking import Tracker
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig

@@ -18,9 +18,9 @@ from bootifol.cli.main import main
 from bootifol.demos.demo_set import DemoSet
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
-from bootifol.evaluation.ranking import draw_references
 from bootifol.files import read_arrays
 from bootifol.rewards.base import RewardModel
+from bootifol.rewards.references import draw_references
 from bootifol.rewards.registry import RewardConfig, check_method, make_reward_model
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.components import build_reward_model

@@ -172,7 +172,9 @@ def test_a_loss_that_was_not_looked_at_is_refused_when_it_is_logged() -> None:
     averages = Averages()
     for loss in (1.0, float("nan"), 2.0):
         averages.add({"agent/actor_loss": torch.tensor(loss)})
-    with pytest.raises(BootifolError, match=r"agent/actor_loss was not a finite number.*lower learning rate"):
+    with pytest.raises(
+        BootifolError, match=r"agent/actor_loss was not a finite number.*lower the learning rate"
+    ):
         averages.pop()
 
 

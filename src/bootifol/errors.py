@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import typing
 
 STOPPED = 130
@@ -15,15 +16,54 @@ class BootifolError(Exception):
     """
 
 
+def fields_of(what: str, config: object, *names: str) -> dict[str, float]:
+    """A configuration's numbers by the names that sentences give them; fields that are None are left out."""
+    values = {f"{what}: {name}": getattr(config, name) for name in names}
+    return {name: value for name, value in values.items() if value is not None}
+
+
 def require_at_least(minimum: float, **fields: float) -> None:
-    """Refuses a configuration's numbers below a minimum; NaN too.
+    """Refuses numbers below a minimum; infinity and NaN, too.
 
     Raises:
-        BootifolError: names the first field that is too small.
+        BootifolError: names the first such field.
     """
     for name, value in fields.items():
-        if not value >= minimum:
+        if not minimum <= value < math.inf:
             raise BootifolError(f"{name} must be at least {minimum}, not {value}")
+
+
+def require_positive(**fields: float) -> None:
+    """Refuses numbers that are not above 0; infinity and NaN, too.
+
+    Raises:
+        BootifolError: names the first such field.
+    """
+    for name, value in fields.items():
+        if not 0 < value < math.inf:
+            raise BootifolError(f"{name} must be positive, not {value}")
+
+
+def require_share(**fields: float) -> None:
+    """Refuses numbers outside of [0, 1].
+
+    Raises:
+        BootifolError: names the first such field.
+    """
+    for name, value in fields.items():
+        if not 0 <= value <= 1:
+            raise BootifolError(f"{name} must lie in [0, 1], not {value}")
+
+
+def require_below_one(**fields: float) -> None:
+    """Refuses numbers outside of [0, 1).
+
+    Raises:
+        BootifolError: names the first such field.
+    """
+    for name, value in fields.items():
+        if not 0 <= value < 1:
+            raise BootifolError(f"{name} must lie in [0, 1), not {value}")
 
 
 def require_choices(of: str, config: object) -> None:

@@ -90,7 +90,10 @@ def write_arrays(target: Path, arrays: Arrays, texts: Mapping[str, str] | None =
     with written_aside(target) as aside:
         # Not np.ascontiguousarray, which gives numbers without a dimension one.
         contiguous = {name: np.asarray(array, order="C") for name, array in arrays.items()}
+        aside.touch()
+        mode = aside.stat().st_mode
         save_file(contiguous, aside, None if texts is None else dict(texts))
+        aside.chmod(mode)  # safetensors lets nobody but its writer read it
 
 
 def read_arrays(path: Path, what: str) -> Arrays:
@@ -119,6 +122,10 @@ def _read_errors(path: Path, what: str) -> Iterator[None]:
         yield
     except FileNotFoundError:
         raise BootifolError(f"{what} is missing: there is no {path}") from None
+    except PermissionError:
+        raise BootifolError(
+            f"{what} must not be read by this user: {path}; ask its owner, or copy it"
+        ) from None
     except (OSError, SafetensorError, ValueError) as error:
         raise BootifolError(f"{what} is damaged or incomplete: {path}: {error}") from error
 

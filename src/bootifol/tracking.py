@@ -40,7 +40,7 @@ class Averages:
             if name.endswith("loss") and not math.isfinite(mean):
                 raise BootifolError(
                     f"{name} was not a finite number at some of the last steps, which were not taken; the rewards may "
-                    "have grown without bound: resume from the last checkpoint with a lower learning rate"
+                    "have grown without bound: lower the learning rate in the run's config.json"
                 )
         return means
 

@@ -159,6 +159,10 @@ def test_ones_own_videos_are_enough(demos: Path, tmp_path: Path, monkeypatch: py
         (["report", "nowhere"], "nowhere"),
         (["demos", "check", "nowhere"], "nowhere"),
         (["demos", "record", "--task", "fly", "--out", "y"], "there is no task 'fly'"),
+        (
+            ["demos", "record", "--task", "drawn_home", "--seed", "-1", "--out", "y"],
+            "seed must be at least 0, not -1",
+        ),
     ],
 )
 def test_bad_input_gets_a_sentence_and_exit_code_2(
@@ -217,7 +221,7 @@ def test_help_breaks_lines_where_the_terminal_ends_and_not_where_a_docstring_doe
             main(["train", "--help"])
         printed = " ".join(capsys.readouterr().out.replace("│", " ").split())
         assert "cuda:NUMBER, or mps on a Mac. None but the CPU has been tried. (default: auto)" in printed
-        assert "those still in replay; 0 as in the paper, whose" in printed, "a setting of a setting"
+        assert "drawn at random among those still in replay, and" in printed, "a setting of a setting"
 
 
 @pytest.mark.parametrize(

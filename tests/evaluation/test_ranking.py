@@ -9,7 +9,6 @@ from bootifol.evaluation.ranking import (
     KINDS,
     _tau_of_pairs,
     area_under_curve,
-    draw_references,
     expert_above_random,
     margin,
     rank_videos,
@@ -17,6 +16,7 @@ from bootifol.evaluation.ranking import (
     ranking_scores,
 )
 from bootifol.evaluation.tables import RankingRow
+from bootifol.rewards.references import draw_references
 from bootifol.types import FrameBatch, Rewards, Video
 
 

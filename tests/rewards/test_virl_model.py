@@ -190,7 +190,7 @@ def test_videos_too_short_to_be_altered_are_refused() -> None:
     ],
 )
 def test_bad_configurations_are_refused_with_a_sentence(field: str, value: float) -> None:
-    with pytest.raises(BootifolError, match=f"virl: {field} is"):
+    with pytest.raises(BootifolError, match=rf"virl: {field} (is|must)"):
         replace(VirlConfig(), **{field: value})
 
 

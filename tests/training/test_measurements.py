@@ -7,8 +7,9 @@ from pathlib import Path
 
 from tiny_runs import ENDS_SOON, new_run
 
+from bootifol.evaluation.returns import evaluation_seeds
 from bootifol.evaluation.tables import read_evaluations
-from bootifol.training.interactive import episode_seed, evaluation_seeds
+from bootifol.training.interactive import episode_seed
 
 TWO_ON_THE_WAY = replace(
     ENDS_SOON,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_runs import RUNS, TINY, WITH_DEMONSTRATIONS, new_run, resumed
+from tiny_runs import ENDS_SOON, RUNS, TINY, WITH_DEMONSTRATIONS, new_run, resumed
 
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.errors import BootifolError
@@ -211,6 +211,43 @@ def test_a_full_disk_during_a_checkpoint_leaves_the_last_good_one(
     rest = resumed(tmp_path / "parts")
     assert rest.learn()
     assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
+
+
+def test_what_lies_beside_checkpoints_is_left_alone_but_what_a_killed_process_wrote(
+    tmp_path: Path, demos: Path
+) -> None:
+    checkpoints = tmp_path / "run" / "checkpoints"
+    for name in ("best_so_far", "zzz", ".000000000060-000000004.0123abcd.tmp"):
+        (checkpoints / name).mkdir(parents=True)
+    assert new_run(tmp_path / "run", demos, config=ENDS_SOON).learn()
+    newest = newest_checkpoint(checkpoints)
+    assert newest is not None
+    assert {path.name for path in checkpoints.iterdir()} == {"best_so_far", "zzz", newest.name}
+    assert newest.name == "000000000090-000000004"
+
+
+@pytest.mark.parametrize(
+    "index",
+    [
+        "[]",
+        "{}",
+        '{"format": 1}',
+        '{"format": 1, "counters": {"hops": 1}, "random_state": {}, "metrics_bytes": 0}',
+    ],
+)
+def test_a_damaged_index_of_a_checkpoint_is_named(tmp_path: Path, demos: Path, index: str) -> None:
+    assert new_run(tmp_path / "run", demos, config=ENDS_SOON).learn()
+    newest = newest_checkpoint(tmp_path / "run" / "checkpoints")
+    assert newest is not None
+    (newest / "checkpoint.json").write_text(index)
+    with pytest.raises(BootifolError, match="is damaged or of another version of bootifol"):
+        resumed(tmp_path / "run")
+
+
+def test_a_replay_smaller_than_an_episode_is_refused_before_anything_is_read(tmp_path: Path) -> None:
+    config = replace(TINY, agent=replace(TINY.agent, replay_capacity=20))
+    with pytest.raises(BootifolError, match=r"agent.replay_capacity is 20 frames, and one episode has 31"):
+        new_run(tmp_path / "run", tmp_path / "no_demos", config=config)
 
 
 def test_a_truncated_checkpoint_is_named(

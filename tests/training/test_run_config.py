@@ -44,6 +44,45 @@ def test_a_directory_without_a_run_is_named(tmp_path: Path) -> None:
         RunConfig.read(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("place", "value", "sentence"),
+    [
+        (("config",), None, "it has None in place of the fields of TrainingConfig"),
+        (("config", "agent"), [], r"it has \[\] in place of the fields of DrQv2Config"),
+        (("config", "threads"), "two", "says that threads is 'two'"),
+        (("config", "agent", "batch_size"), 1.5, "says that batch_size is 1.5"),
+        (("config", "agent", "learning_rate"), -1e-4, "agent: learning_rate must be positive"),
+        (("config", "tensorboard"), 1, "says that tensorboard is 1"),
+        (("config", "alignment", "time_share"), 3.0, "alignment: time_share must lie in"),
+        (("seed",), "x", "says that seed is 'x'"),
+        (("seed",), -1, "seed must be at least 0"),
+        (("time_budget",), "60m", "says that time_budget is '60m'"),
+    ],
+)
+def test_what_was_edited_wrongly_is_named(
+    tmp_path: Path, place: tuple[str, ...], value: object, sentence: str
+) -> None:
+    RunConfig("drawn_reach", "bootifol", "cpu", 3, "demos", None, CPU).write(tmp_path, [])
+    path = tmp_path / "config.json"
+    data = section = json.loads(path.read_text())
+    for name in place[:-1]:
+        section = section[name]
+    section[place[-1]] = value
+    path.write_text(json.dumps(data))
+    with pytest.raises(BootifolError, match=sentence):
+        RunConfig.read(tmp_path)
+
+
+def test_a_learning_rate_lowered_by_hand_is_the_runs(tmp_path: Path) -> None:
+    """What a run whose losses are not finite advises."""
+    RunConfig("drawn_reach", "bootifol", "cpu", 3, "demos", None, CPU).write(tmp_path, [])
+    path = tmp_path / "config.json"
+    data = json.loads(path.read_text())
+    data["config"]["agent"]["learning_rate"] = 0.00001
+    path.write_text(json.dumps(data))
+    assert RunConfig.read(tmp_path).training.agent.learning_rate == 1e-5
+
+
 def test_the_paper_preset_is_the_papers_table() -> None:
     """Table "Hyperparameters" and section 3; DrQ-v2's own defaults where the paper names none."""
     paper: TrainingConfig = PAPER

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
-from bootifol.errors import BootifolError, require_at_least, require_choices
+from bootifol.errors import (
+    fields_of,
+    require_at_least,
+    require_below_one,
+    require_choices,
+    require_positive,
+    require_share,
+)
 
 Precision = Literal["bf16", "fp32"]
 EncoderName = Literal["paper", "strided", "coarse"]
@@ -92,35 +100,21 @@ class DrQv2Config:
     """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""
 
     def __post_init__(self) -> None:
+        of_self = partial(fields_of, "agent", self)
         require_choices("agent", self)
-        at_least_one = (
-            "feature_dim",
-            "hidden_dim",
-            "batch_size",
-            "update_every",
-            "warm_up_hold",
-            "n_step",
-            "replay_capacity",
-        )
-        not_negative = (
+        widths = ("feature_dim", "hidden_dim", "batch_size", "replay_capacity")
+        require_at_least(1, **of_self(*widths, "update_every", "warm_up_hold", "n_step"))
+        exploration = (
             "exploration_start",
             "exploration_end",
             "exploration_steps",
             "noise_clip",
-            "saturation_weight",
-            "cloning_weight",
             "warm_up_steps",
-            "shift",
         )
-        for names, least in ((at_least_one, 1), (not_negative, 0)):
-            require_at_least(least, **{f"agent {name}": getattr(self, name) for name in names})
-        for name in ("discount", "target_rate"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise BootifolError(f"agent {name} must lie in [0, 1], not {getattr(self, name)}")
-        if not 0 <= self.averaging < 1:
-            raise BootifolError(f"agent averaging must lie in [0, 1), not {self.averaging}")
-        if not self.learning_rate > 0:
-            raise BootifolError(f"agent learning_rate must be positive, not {self.learning_rate}")
+        require_at_least(0, **of_self(*exploration, "saturation_weight", "cloning_weight", "shift"))
+        require_positive(**of_self("learning_rate"))
+        require_share(**of_self("discount", "target_rate"))
+        require_below_one(**of_self("averaging"))
 
     def exploration(self, agent_steps: float) -> float:
         """Standard deviation of the noise after so many agent steps."""

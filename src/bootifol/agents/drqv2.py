@@ -348,7 +348,9 @@ class DrQv2:
 
     @staticmethod
     def _step(optimizer: torch.optim.Adam, loss: Tensor, what: str) -> None:
-        advice = "the rewards may have grown without bound: resume from the last checkpoint with a lower learning rate"
+        advice = (
+            "the rewards may have grown without bound: lower agent.learning_rate in the run's config.json"
+        )
         take_step(optimizer, loss, f"the agent's {what}", advice)
 
 

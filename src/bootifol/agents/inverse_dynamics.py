@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from bootifol.agents.config import EncoderName
+from bootifol.agents.config import EncoderName, Precision
 from bootifol.agents.gradient_step import take_step
 from bootifol.agents.networks import Encoder
 from bootifol.devices import to_device, to_host
@@ -29,6 +29,7 @@ class InverseDynamics:
         action_dim: action dimensions.
         seed: of the initial parameters.
         hidden_dim: width of the two hidden layers.
+        precision: of convolutions and matrix products; parameters and the loss are float32.
         device: where to compute, as PyTorch names it.
     """
 
@@ -41,9 +42,11 @@ class InverseDynamics:
         action_dim: int,
         seed: int,
         hidden_dim: int = 512,
+        precision: Precision = "bf16",
         device: str = "cpu",
     ) -> None:
         self.stack, self.n_step = stack, n_step
+        self._dtype = torch.bfloat16 if precision == "bf16" else torch.float32
         self._device = torch.device(device)
         # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
         with torch.random.fork_rng(devices=[]):
@@ -78,7 +81,7 @@ class InverseDynamics:
         predicted = self._predict(batch.observation, batch.next_observation)
         loss = nn.functional.mse_loss(predicted, to_device(batch.action, self._device))
         self._optimizer.param_groups[0]["lr"] = learning_rate
-        advice = "the step was not taken: resume from the last checkpoint"
+        advice = "the step was not taken: lower demonstrations.inverse_dynamics_learning_rate in the run's config.json"
         take_step(self._optimizer, loss, "the inverse dynamics", advice)
         return {"inverse_dynamics/loss": loss.detach()}
 
@@ -118,8 +121,8 @@ class InverseDynamics:
     def _predict(self, before: Tensor, after: Tensor) -> Tensor:
         """Actions `[B, A]` from two stacks, uint8 `[B, 3 * stack, S, S]` each."""
         pictures = torch.cat([to_device(stack, self._device) for stack in (before, after)], dim=1)
-        pictures = pictures.to(torch.bfloat16, memory_format=torch.channels_last)
-        with torch.autocast(self._device.type, torch.bfloat16):
+        pictures = pictures.to(self._dtype, memory_format=torch.channels_last)
+        with torch.autocast(self._device.type, torch.bfloat16, enabled=self._dtype == torch.bfloat16):
             output: Tensor = self.network(pictures)
         return output.float()
 

@@ -40,7 +40,7 @@ from bootifol.demos.shards import (
 )
 from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.rollout import play_episode
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, require_at_least
 from bootifol.experts import Behavior, make_behavior
 from bootifol.progress import progress
 from bootifol.tasks import make_environment, task_named
@@ -153,8 +153,8 @@ def record(
     Raises:
         BootifolError: another set is there already, the disk is too small, or a name is unknown.
     """
-    if workers < 1 or episodes < 1:
-        raise BootifolError(f"episodes and workers must be at least 1, not {episodes} and {workers}")
+    require_at_least(1, episodes=episodes, workers=workers)
+    require_at_least(0, seed=seed)
     if behavior not in get_args(Behavior):
         raise BootifolError(
             f"there is no behavior '{behavior}'; choose among {', '.join(get_args(Behavior))}"

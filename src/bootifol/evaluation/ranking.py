@@ -16,6 +16,7 @@ from scipy import stats
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import RankingRow
 from bootifol.rewards.base import RewardModel
+from bootifol.rewards.references import draw_references
 from bootifol.types import Metrics, Video, VideoSource
 
 KINDS = ("random", "half_good", "expert")
@@ -53,12 +54,6 @@ class RankingScores:
             "ranking/expert_margin": self.expert_margin,
             "ranking/half_good_margin": self.half_good_margin,
         }
-
-
-def draw_references(model: RewardModel, expert: VideoSource, rng: np.random.Generator) -> list[Video]:
-    """As many different expert videos as one call of `label` wants, or all where there are fewer."""
-    drawn = rng.choice(len(expert), size=min(model.reference_count, len(expert)), replace=False)
-    return [expert[int(index)] for index in drawn]
 
 
 def rank_videos(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
+import numpy as np
 
 from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.pixels import PixelEnvironment
@@ -29,6 +30,19 @@ class EpisodeResult:
 
     success: bool | None
     """Whether the task was solved, where the environment says so."""
+
+
+def evaluation_seeds(run_seed: int, count: int, agent_steps: int = 0) -> list[int]:
+    """Seeds of evaluation starts, which training never meets.
+
+    Args:
+        run_seed: of the run.
+        count: of seeds.
+        agent_steps: at which the policy is measured on the way, each time from other starts, so that what they have in
+            common does not hide in the curve; 0 for the final evaluation's.
+    """
+    entropies = ([run_seed, 1, index, agent_steps] for index in range(count))
+    return [int(np.random.SeedSequence(entropy).generate_state(1)[0]) for entropy in entropies]
 
 
 def evaluate(

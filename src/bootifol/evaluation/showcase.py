@@ -12,9 +12,9 @@ import numpy as np
 
 from bootifol.demos.video_writing import write_video
 from bootifol.envs.rollout import Act, play_episode
-from bootifol.evaluation.ranking import draw_references
 from bootifol.files import write_arrays
 from bootifol.rewards.base import RewardModel
+from bootifol.rewards.references import draw_references
 from bootifol.types import Arrays, Frames, Rewards, VideoSource
 
 

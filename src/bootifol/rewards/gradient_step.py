@@ -57,5 +57,5 @@ class GradientStep:
             named = ", ".join(f"{name} {number:.4g}" for name, number in metrics.items())
             raise BootifolError(
                 f"the reward model's loss is not a finite number at its gradient step {self._number} ({named}); the "
-                "step was not taken: go on from the last checkpoint with a smaller learning rate"
+                "step was not taken: lower the reward's learning_rate in the run's config.json"
             )

@@ -14,9 +14,8 @@ from bootifol.demos.import_videos import LARGEST_SQUARE, read_recordings
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.demos.video_writing import write_video
 from bootifol.envs.rollout import PlayedEpisode
-from bootifol.errors import BootifolError
-from bootifol.evaluation.ranking import draw_references
-from bootifol.evaluation.returns import EpisodeResult, evaluation_rows, scaled_return
+from bootifol.errors import BootifolError, require_at_least
+from bootifol.evaluation.returns import EpisodeResult, evaluation_rows, evaluation_seeds, scaled_return
 from bootifol.evaluation.returns import evaluate as evaluate_act
 from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import EvaluationRow
@@ -24,11 +23,17 @@ from bootifol.files import written_aside
 from bootifol.presets import preset as preset_named
 from bootifol.progress import progress
 from bootifol.reports.html import report
+from bootifol.rewards.references import draw_references
 from bootifol.rewards.registry import check_method
 from bootifol.training.checkpoint import load_checkpoint
-from bootifol.training.components import build_environment, build_reward_model, open_demos, reference_rng
+from bootifol.training.components import (
+    build_backbone,
+    build_environment,
+    build_reward_model,
+    open_demos,
+    reference_rng,
+)
 from bootifol.training.config import TrainingConfig
-from bootifol.training.interactive import evaluation_seeds
 from bootifol.training.run_config import RunConfig
 from bootifol.training.saved_policy import require_checkpoint, restored_agent
 from bootifol.training.train import Run
@@ -145,6 +150,7 @@ def evaluate_run(
     Raises:
         BootifolError: there is no run, it has no checkpoint yet, or a file cannot be read or written.
     """
+    require_at_least(0, seed=seed)
     run = RunConfig.read(Path(directory))
     task = run.resolved_task()
     environment = build_environment(run, task.evaluation_steps)
@@ -205,7 +211,7 @@ def scored_videos(directory: AnyPath, videos: Sequence[AnyPath]) -> Iterator[tup
             f"{directory} was trained on the environment's reward: it has no reward for videos"
         )
     load_checkpoint(require_checkpoint(Path(directory)), {"reward_model": model})
-    expert = open_demos(run, Console(stderr=True)).expert
+    expert = open_demos(run, build_backbone(run), Console(stderr=True)).expert
     references = draw_references(model, expert, reference_rng(run.seed, 0))
     length = min((len(reference.frames) for reference in references), default=None)
     for path in map(Path, videos):

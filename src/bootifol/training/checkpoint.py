@@ -16,6 +16,7 @@ process leaves the last good one.
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,6 +31,8 @@ from bootifol.training.budget import Counters
 from bootifol.types import Arrays
 
 FORMAT = 1
+_NAME = re.compile(r"\d{12}-\d{9}")
+"""Of a checkpoint's directory; whatever else lies beside it is somebody's own."""
 
 
 class Stateful(Protocol):
@@ -83,6 +86,8 @@ def save_checkpoint(directory: Path, progress: Progress, components: Mapping[str
     for older in _checkpoints(directory):
         if older != target:
             shutil.rmtree(older)
+    for killed in directory.glob(".*.tmp"):  # a process that was killed while it wrote could not
+        shutil.rmtree(killed, ignore_errors=True)
     return target
 
 
@@ -99,9 +104,17 @@ def load_checkpoint(checkpoint: Path, components: Mapping[str, Stateful]) -> Pro
         BootifolError: a file is missing, truncated or does not fit the configuration.
     """
     meta = read_json(checkpoint / "checkpoint.json", "the checkpoint's index")
-    if meta.get("format") != FORMAT:
+    try:
+        written = meta["format"]
+        progress = Progress(Counters(**meta["counters"]), meta["random_state"], meta["metrics_bytes"])
+    except (KeyError, TypeError) as error:
         raise BootifolError(
-            f"{checkpoint} was written in checkpoint format {meta.get('format')}, this version reads {FORMAT}; "
+            f"{checkpoint / 'checkpoint.json'} is damaged or of another version of bootifol: {error}; resume with the "
+            "version named in the run's config.json"
+        ) from error
+    if written != FORMAT:
+        raise BootifolError(
+            f"{checkpoint} was written in checkpoint format {written}, this version reads {FORMAT}; "
             "resume it with the version named in the run's config.json"
         )
     for name, component in components.items():
@@ -112,7 +125,7 @@ def load_checkpoint(checkpoint: Path, components: Mapping[str, Stateful]) -> Pro
             raise BootifolError(
                 f"the checkpoint's {name} does not fit this run's configuration: {checkpoint}: {error}"
             ) from error
-    return Progress(Counters(**meta["counters"]), meta["random_state"], meta["metrics_bytes"])
+    return progress
 
 
 def restore_generator(random_state: dict[str, Any]) -> np.random.Generator:
@@ -125,4 +138,4 @@ def restore_generator(random_state: dict[str, Any]) -> np.random.Generator:
 def _checkpoints(directory: Path) -> list[Path]:
     if not directory.is_dir():
         return []
-    return sorted(path for path in directory.iterdir() if path.is_dir() and not path.name.startswith("."))
+    return sorted(path for path in directory.iterdir() if _NAME.fullmatch(path.name) and path.is_dir())

@@ -52,13 +52,19 @@ class Demos:
 
 
 @dataclass(frozen=True)
-class Components:
-    """The parts of a run that learn or remember."""
+class Learners:
+    """The networks of a run."""
 
     reward_model: RewardModel
     backbone: Backbone | None
     """Frozen, and so no part of a checkpoint; None where the reward model reads pixels."""
     agent: DrQv2
+
+
+@dataclass(frozen=True)
+class Components(Learners):
+    """The parts of a run that learn or remember."""
+
     replay: ReplayBuffer
     agent_videos: AgentVideos
     demonstrations: Demonstrations | None
@@ -170,21 +176,36 @@ def build_demonstrations(run: RunConfig, expert: VideoSource, action_dim: int) -
         agent.n_step,
         action_dim,
         run.seed,
+        precision=agent.precision,
         device=chosen_device(run.training.device),
     )
     return Demonstrations(config, expert, replay, inverse_dynamics, pictures.agent_size, action_dim)
 
 
+def build_learners(run: RunConfig, environment: gymnasium.Env[Any, Any]) -> Learners:
+    """The networks, untrained. They need no videos, so what cannot be built is heard of before any are read."""
+    frames, capacity = run.resolved_task().episode_steps + 1, run.training.agent.replay_capacity
+    if capacity < frames:
+        raise BootifolError(
+            f"agent.replay_capacity is {capacity:,} frames, and one episode has {frames:,}: give it many times as many"
+        )
+    reward_model = build_reward_model(run)
+    return Learners(reward_model, build_backbone(run), build_agent(run, environment, reward_model))
+
+
 def build_components(
-    run: RunConfig, environment: gymnasium.Env[Any, Any], expert: VideoSource, console: Console
+    run: RunConfig,
+    environment: gymnasium.Env[Any, Any],
+    learners: Learners,
+    expert: VideoSource,
+    console: Console,
 ) -> Components:
-    """Everything that learns or remembers; says how much memory it will take before it takes it."""
+    """Learners and stores; says how much memory the stores will take before it takes it."""
     config, pictures = run.training, run.training.pictures
     assert isinstance(environment.action_space, gymnasium.spaces.Box)
     action_dim = environment.action_space.shape[0]
     frames = run.resolved_task().episode_steps + 1
-    reward_model = build_reward_model(run)
-    backbone = build_backbone(run)
+    reward_model, backbone = learners.reward_model, learners.backbone
     ring = (
         config.interactive.agent_videos,
         frames,
@@ -207,7 +228,7 @@ def build_components(
     return Components(
         reward_model=reward_model,
         backbone=backbone,
-        agent=build_agent(run, environment, reward_model),
+        agent=learners.agent,
         replay=ReplayBuffer(
             config.agent.replay_capacity,
             pictures.agent_size,
@@ -222,14 +243,17 @@ def build_components(
     )
 
 
-def open_demos(run: RunConfig, console: Console) -> Demos:
+def open_demos(run: RunConfig, backbone: Backbone | None, console: Console) -> Demos:
     """Opens the demo sets of a run; records the random videos where there are none.
+
+    Args:
+        run: what it is.
+        backbone: computes the features of the videos; None where the reward model reads pixels.
+        console: where sentences go.
 
     Raises:
         BootifolError: there are no expert videos, or they do not match the task and the configuration.
     """
-    # First, for a name that is not known should be heard of before videos are read or recorded.
-    backbone = build_backbone(run)
     root = Path(run.demos)
     paths = find_demo_sets(root)
     if "expert" not in paths:

@@ -8,7 +8,7 @@ from bootifol.agents.config import DrQv2Config
 from bootifol.demos.augmentation import AugmentationConfig
 from bootifol.devices import check_device_name
 from bootifol.envs.pictures import PictureConfig
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.errors import BootifolError, fields_of, require_at_least, require_positive, require_share
 from bootifol.rewards.registry import RewardConfig
 from bootifol.training.demonstrations import DemonstrationConfig
 
@@ -27,7 +27,8 @@ class AlignmentConfig:
     """Gradient steps a line of metrics averages over."""
 
     def __post_init__(self) -> None:
-        require_at_least(0, gradient_steps=self.gradient_steps, time_share=self.time_share)
+        require_at_least(0, gradient_steps=self.gradient_steps)
+        require_share(**fields_of("alignment", self, "time_share"))
         require_at_least(1, log_every=self.log_every)
 
 
@@ -54,8 +55,8 @@ class InteractiveConfig:
     that learns to tell them from the expert's spoils the policy."""
 
     relabel_episodes: int = 0
-    """Stored episodes rewarded anew after each update of the reward, drawn at random among those still
-    in replay; 0 as in the paper, whose stored rewards go stale."""
+    """Stored episodes rewarded anew after each update of the reward, drawn at random among those still in replay, and
+    as many demonstrations; 0 as in the paper, whose stored rewards go stale."""
 
     log_every: int = 1000
     """Agent steps a line of metrics averages over."""
@@ -146,4 +147,6 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         check_device_name(self.device)
-        require_at_least(1, threads=self.threads)
+        lengths = ("action_repeat", "episode_steps", "evaluation_steps")
+        require_at_least(1, threads=self.threads, **fields_of("training", self, *lengths))
+        require_positive(checkpoint_minutes=self.checkpoint_minutes)

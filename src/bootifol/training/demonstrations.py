@@ -12,7 +12,9 @@ most of them are drawn from where the picture moves ("copycat" policies: Wen et 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -20,10 +22,10 @@ from numpy.typing import NDArray
 
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.envs.pictures import resize
-from bootifol.errors import BootifolError, require_at_least
-from bootifol.evaluation.ranking import draw_references
+from bootifol.errors import fields_of, require_at_least, require_below_one, require_positive, require_share
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
+from bootifol.rewards.references import draw_references
 from bootifol.types import Arrays, Batch, Episode, Frames, StepMetrics, Video, VideoSource
 
 MOVING = 0.1
@@ -73,17 +75,13 @@ class DemonstrationConfig:
     """Transitions of a gradient step of the inverse dynamics."""
 
     def __post_init__(self) -> None:
-        if not 0 <= self.share < 1:
-            raise BootifolError(f"demonstrations: share must be in [0, 1), not {self.share}")
-        for name in ("moving_share", "history_dropout", "policy_share"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise BootifolError(f"demonstrations: {name} must be in [0, 1], not {getattr(self, name)}")
-        names = ("videos", "inverse_dynamics_updates", "phases", "repeat_every", "batch_size")
-        require_at_least(1, **{f"demonstrations.{name}": getattr(self, name) for name in names})
-        for name in ("inverse_dynamics_learning_rate", "cloning_learning_rate"):
-            if not getattr(self, name) > 0:
-                raise BootifolError(f"demonstrations: {name} must be positive, not {getattr(self, name)}")
-        require_at_least(0, **{"demonstrations.cloning_updates": self.cloning_updates})
+        of_self = partial(fields_of, "demonstrations", self)
+        require_below_one(**of_self("share"))
+        require_share(**of_self("moving_share", "history_dropout", "policy_share"))
+        counts = ("videos", "inverse_dynamics_updates", "phases", "repeat_every", "batch_size")
+        require_at_least(1, **of_self(*counts))
+        require_at_least(0, **of_self("cloning_updates"))
+        require_positive(**of_self("inverse_dynamics_learning_rate", "cloning_learning_rate"))
 
 
 class Demonstrations:
@@ -113,10 +111,11 @@ class Demonstrations:
         self.frame_size = frame_size
         moving = []
         for index in range(min(config.videos, len(expert))):
-            frames = self._at_agent_size(expert[index])
+            video = expert[index]
+            frames = self._at_agent_size(video)
             steps = len(frames) - 1
             nothing = np.zeros((steps, action_dim), np.float32)
-            replay.add(Episode(frames, nothing, expert[index], False), np.zeros(steps, np.float32))
+            replay.add(Episode(frames, nothing, video, False), np.zeros(steps, np.float32))
             moving.append(moving_steps(frames))
         self._moving = np.flatnonzero(np.concatenate(moving))
         self._still = np.flatnonzero(~np.concatenate(moving))
@@ -151,9 +150,23 @@ class Demonstrations:
     def infer(self, index: int, reward_model: RewardModel, rng: np.random.Generator) -> None:
         """Gives a video the actions and rewards that inverse dynamics and reward model now see in it."""
         video = self.expert[index]
-        rewards = reward_model.label(video, draw_references(reward_model, self.expert, rng))
+        references = draw_references(reward_model, self.expert, rng, excluded=index)
         actions = self.inverse_dynamics.actions(self._at_agent_size(video))
-        self.replay.relabel(self.replay.episode_ids[index], rewards, actions)
+        self.replay.relabel(self.replay.episode_ids[index], reward_model.label(video, references), actions)
+
+    def reward_anew(self, index: int, reward_model: RewardModel, references: Sequence[Video]) -> None:
+        """Gives a video the rewards that the reward model now sees in it.
+
+        Args:
+            index: of the video.
+            reward_model: the one that learns.
+            references: what it is compared with; not with itself, beside which it would be perfect.
+        """
+        video = self.expert[index]
+        others = [reference for reference in references if reference.name != video.name]
+        if references and not others:
+            return
+        self.replay.relabel(self.replay.episode_ids[index], reward_model.label(video, others))
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
         """Transitions of the expert videos, most of them where the picture moves."""

@@ -16,16 +16,16 @@ from bootifol.agents.drqv2 import DrQv2
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.demos.augmentation import AugmentationConfig, augmented
 from bootifol.envs.rollout import EpisodeRecorder, rollout
-from bootifol.evaluation.ranking import draw_references
 from bootifol.networks.backbones import Backbone
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
+from bootifol.rewards.references import draw_references
 from bootifol.tracking import Averages
 from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.cloning import cloning_due
 from bootifol.training.config import InteractiveConfig
 from bootifol.training.demonstrations import Demonstrations
-from bootifol.types import Action, Batch, Observation, VideoSource
+from bootifol.types import Action, Batch, Observation, Video, VideoSource
 
 
 @dataclass
@@ -135,17 +135,26 @@ class InteractivePhase:
         if self.reward_model.version == version:
             return  # nothing was learned, so no stored reward is stale
         self.counters.reward_updates += 1
-        for _ in range(self.config.relabel_episodes):
-            self._relabel_one()
+        self._renew_rewards()
 
-    def _relabel_one(self) -> None:
-        """Rewards a stored episode anew, so that replay follows the reward as it learns."""
+    def _renew_rewards(self) -> None:
+        """Rewards a few stored episodes anew, and as many demonstrations, so that batches follow the reward."""
+        if not self.config.relabel_episodes:
+            return
+        # The same for all of them: encoding references costs more than encoding what is compared with them.
+        references = draw_references(self.reward_model, self.expert, self.rng)
+        for _ in range(self.config.relabel_episodes):
+            self._relabel_episode(references)
+            if self.demonstrations is not None:
+                index = int(self.rng.integers(len(self.demonstrations)))
+                self.demonstrations.reward_anew(index, self.reward_model, references)
+
+    def _relabel_episode(self, references: list[Video]) -> None:
         ids = self.replay.episode_ids
         kept = range(max(ids.start, ids.stop - len(self.agent_videos)), ids.stop)
         episode_id = int(self.rng.integers(kept.start, kept.stop))
         slot = episode_id % self.config.agent_videos
         video = self.agent_videos[slot]
-        references = draw_references(self.reward_model, self.expert, self.rng)
         # An episode that ended early stands still in the ring up to the full length; no reward looks ahead at that.
         rewards = self.reward_model.label(video, references)[: self.replay.agent_steps_of(episode_id)]
         self.replay.relabel(episode_id, rewards)
@@ -156,16 +165,3 @@ def episode_seed(run_seed: int, episode: int) -> int:
     """The seed of an episode's start, a function of the run's seed and the episode's number alone, so that a
     resumed run meets the same starts."""
     return int(np.random.SeedSequence([run_seed, 0, episode]).generate_state(1)[0])
-
-
-def evaluation_seeds(run_seed: int, count: int, agent_steps: int = 0) -> list[int]:
-    """Seeds of evaluation starts, which training never meets.
-
-    Args:
-        run_seed: of the run.
-        count: of seeds.
-        agent_steps: at which the policy is measured on the way, each time from other starts, so that what they have in
-            common does not hide in the curve; 0 for the final evaluation's.
-    """
-    entropies = ([run_seed, 1, index, agent_steps] for index in range(count))
-    return [int(np.random.SeedSequence(entropy).generate_state(1)[0]) for entropy in entropies]

@@ -17,7 +17,7 @@ from bootifol.evaluation.ranking import (
     rank_videos,
     ranking_scores,
 )
-from bootifol.evaluation.returns import evaluate, evaluation_rows
+from bootifol.evaluation.returns import evaluate, evaluation_rows, evaluation_seeds
 from bootifol.evaluation.showcase import play_showcase, write_showcase
 from bootifol.evaluation.summary import summarize
 from bootifol.evaluation.tables import append_evaluations, append_ranking
@@ -25,7 +25,6 @@ from bootifol.experts import make_expert, make_random
 from bootifol.progress import progress
 from bootifol.training.budget import Budget, Counters
 from bootifol.training.components import Components, Demos, build_environment, reference_rng
-from bootifol.training.interactive import evaluation_seeds
 from bootifol.training.run_config import RunConfig
 from bootifol.types import Action, Metrics, Observation, Video
 

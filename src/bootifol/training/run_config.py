@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import types
 import typing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, require_at_least
 from bootifol.files import read_json, write_json
 from bootifol.tasks import Task, task_named
 from bootifol.training.config import TrainingConfig
@@ -31,6 +32,9 @@ class RunConfig:
     time_budget: float | None
     """Seconds of wall-clock time for learning, or None for the preset's agent steps."""
     training: TrainingConfig
+
+    def __post_init__(self) -> None:
+        require_at_least(0, seed=self.seed)
 
     def resolved_task(self) -> Task:
         """The task with the lengths that this run gives its episodes."""
@@ -81,37 +85,58 @@ class RunConfig:
             raise BootifolError(
                 f"{path} is not a configuration in format {FORMAT}; was it written by bootifol?"
             )
+        hints = typing.get_type_hints(cls)
         try:
             return cls(
-                task=data["task"],
-                method=data["method"],
-                preset=data["preset"],
-                seed=data["seed"],
-                demos=data["demos"],
-                time_budget=data["time_budget"],
-                training=from_json(TrainingConfig, data["config"], str(path)),
+                **{
+                    name: _checked(data[name], hints[name], name, path)
+                    for name in hints
+                    if name != "training"
+                },
+                training=from_json(TrainingConfig, data["config"], path),
             )
         except KeyError as error:
             raise BootifolError(f"{path} lacks {error}; restore the file or start a new run") from error
 
 
-def from_json(kind: type[_Config], data: dict[str, Any], where: str) -> _Config:
+def from_json(kind: type[_Config], data: Any, path: Path) -> _Config:
     """Rebuilds a nested frozen dataclass from what `dataclasses.asdict` and JSON made of it.
 
     Raises:
-        BootifolError: a field is unknown to this version.
+        BootifolError: a field is unknown to this version, or its value is none that it can have.
     """
+    if not isinstance(data, dict):
+        raise BootifolError(f"{path} is damaged: it has {data!r} in place of the fields of {kind.__name__}")
     hints = typing.get_type_hints(kind)
     unknown = sorted(set(data) - set(hints))
     if unknown:
         raise BootifolError(
-            f"{where} names {', '.join(unknown)}, which this version of bootifol does not know: go on with the version "
+            f"{path} names {', '.join(unknown)}, which this version of bootifol does not know: go on with the version "
             "that made the run, or start a new one"
         )
     values: dict[str, Any] = {}
     for name, value in data.items():
         if dataclasses.is_dataclass(hints[name]):
-            values[name] = from_json(typing.cast(type, hints[name]), value, where)
+            values[name] = from_json(typing.cast(type, hints[name]), value, path)
         else:
-            values[name] = tuple(value) if isinstance(value, list) else value
+            values[name] = _checked(value, hints[name], name, path)
     return kind(**values)
+
+
+def _checked(value: Any, kind: Any, name: str, path: Path) -> Any:
+    """A field's value as JSON has it, if it is of the field's type; dataclasses check the rest."""
+    if not _fits(value, kind):
+        raise BootifolError(
+            f"{path} says that {name} is {value!r}, which it cannot be: correct or restore the file"
+        )
+    return value
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    if typing.get_origin(kind) in (typing.Union, types.UnionType):
+        return any(_fits(value, choice) for choice in typing.get_args(kind))
+    if typing.get_origin(kind) is typing.Literal:
+        return value in typing.get_args(kind)
+    if kind in (int, float):
+        return isinstance(value, (int, kind)) and not isinstance(value, bool)
+    return isinstance(value, kind)

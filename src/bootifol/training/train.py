@@ -32,7 +32,7 @@ from bootifol.training.checkpoint import (
     save_checkpoint,
 )
 from bootifol.training.cloning import cloning_extent, cloning_phase
-from bootifol.training.components import build_components, build_environment, open_demos
+from bootifol.training.components import build_components, build_environment, build_learners, open_demos
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.interruption import Interruption
 from bootifol.training.measurements import Measurements
@@ -65,9 +65,12 @@ class Run:
         device = chosen_device(config.device)
         if device != "cpu":
             self.console.print(f"computing on {device}, which has not been tried yet; --device cpu has")
-        self.demos = open_demos(self.run, self.console)
         self.environment = build_environment(self.run, self.task.episode_steps)
-        self.components = build_components(self.run, self.environment, self.demos.expert, self.console)
+        learners = build_learners(self.run, self.environment)
+        self.demos = open_demos(self.run, learners.backbone, self.console)
+        self.components = build_components(
+            self.run, self.environment, learners, self.demos.expert, self.console
+        )
         self.counters = Counters()
         self.rng = np.random.default_rng([self.run.seed, 3])
         self._metrics_bytes = 0

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
-from bootifol.errors import BootifolError, require_choices
+from bootifol.errors import (
+    BootifolError,
+    fields_of,
+    require_at_least,
+    require_below_one,
+    require_choices,
+    require_positive,
+)
 
 
 @dataclass(frozen=True)
@@ -99,21 +107,23 @@ class BootifolConfig:
     """bf16 computes the convolutions in bfloat16; parameters, LSTM, losses and Adam stay in float32."""
 
     def __post_init__(self) -> None:
+        of_self = partial(fields_of, "bootifol", self)
         require_choices("bootifol", self)
-        for field in ("references", "sequence_times", "predicted_states", "window", "width_divisor"):
-            if getattr(self, field) < 1:
-                raise BootifolError(f"bootifol: {field} is {getattr(self, field)}, but must be at least 1")
-        for field in ("temperature", "soft_min_temperature", "learning_rate"):
-            if not getattr(self, field) > 0:
-                raise BootifolError(f"bootifol: {field} is {getattr(self, field)}, but must be above 0")
-        for loss in ("multiview", "triplet", "autoencoder", "prediction", "sequence"):
-            field = f"{loss}_weight"
-            if not getattr(self, field) >= 0:
-                raise BootifolError(
-                    f"bootifol: {field} is {getattr(self, field)}; use 0 to leave the loss out"
-                )
+        counts = (
+            "references",
+            "sequence_times",
+            "predicted_states",
+            "window",
+            "frames_per_video",
+            "width_divisor",
+        )
+        require_at_least(1, **of_self(*counts))
+        losses = ("multiview", "triplet", "autoencoder", "prediction", "sequence")
+        require_at_least(0, **of_self("margin", *(f"{loss}_weight" for loss in losses)))
+        require_positive(**of_self("temperature", "soft_min_temperature", "learning_rate"))
+        require_below_one(**of_self("spoiled_share", "frame_drop", "leak"))
         of_backbone = ("triplet", "prediction", "sequence")
-        learned = of_backbone if self.backbone else ("multiview", "autoencoder", *of_backbone)
+        learned = of_backbone if self.backbone else losses
         if not any(getattr(self, f"{loss}_weight") for loss in learned):
             raise BootifolError(
                 f"bootifol: {', '.join(f'{loss}_weight' for loss in learned)} are all 0, so nothing would be learned; "
@@ -124,16 +134,8 @@ class BootifolConfig:
                 f"bootifol: videos_per_class is {self.videos_per_class}, but L_O compares an expert video "
                 "with another one, so it must be at least 2"
             )
-        if not 0 <= self.spoiled_share < 1:
-            raise BootifolError(f"bootifol: spoiled_share is {self.spoiled_share}, but must be in [0, 1)")
-        if not 0 <= self.frame_drop < 1:
-            raise BootifolError(f"bootifol: frame_drop is {self.frame_drop}, but must be in [0, 1)")
-        if self.frames_per_video is not None and self.frames_per_video < 1:
-            raise BootifolError(
-                f"bootifol: frames_per_video is {self.frames_per_video}; use at least 1, or none for all"
-            )
         if self.width_divisor > 32:
-            raise BootifolError(f"bootifol: width_divisor is {self.width_divisor}, but must be at most 32")
+            raise BootifolError(f"bootifol: width_divisor must be at most 32, not {self.width_divisor}")
         if self.reward_scale == "alignment" and self.reward == "cosine":
             raise BootifolError(
                 "bootifol: reward_scale alignment is for the distance reward; the cosine lies in [-1, 1] already, "

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
-from bootifol.errors import BootifolError, require_choices
+from bootifol.errors import (
+    BootifolError,
+    fields_of,
+    require_at_least,
+    require_below_one,
+    require_choices,
+    require_positive,
+)
 
 
 @dataclass(frozen=True)
@@ -51,24 +59,13 @@ class ContextTranslationConfig:
     """bf16 computes the networks in bfloat16; parameters, losses, rewards and Adam stay in float32."""
 
     def __post_init__(self) -> None:
+        of_self = partial(fields_of, "context translation", self)
         require_choices("context translation", self)
-        for field in ("references", "pairs", "frames_per_pair", "width_divisor"):
-            if getattr(self, field) < 1:
-                raise BootifolError(
-                    f"context translation: {field} is {getattr(self, field)}, but must be at least 1"
-                )
+        require_at_least(1, **of_self("references", "pairs", "frames_per_pair", "width_divisor"))
+        require_at_least(0, **of_self("image_weight", "reconstruction_weight", "alignment_weight"))
+        require_positive(**of_self("learning_rate"))
+        require_below_one(**of_self("leak"))
         if self.width_divisor > 32:
             raise BootifolError(
-                f"context translation: width_divisor is {self.width_divisor}, but must be at most 32"
+                f"context translation: width_divisor must be at most 32, not {self.width_divisor}"
             )
-        if not self.learning_rate > 0:
-            raise BootifolError(
-                f"context translation: learning_rate is {self.learning_rate}, but must be above 0"
-            )
-        for field in ("image", "reconstruction", "alignment"):
-            if not getattr(self, f"{field}_weight") >= 0:
-                raise BootifolError(
-                    f"context translation: {field}_weight is {getattr(self, f'{field}_weight')}; use 0 to leave it out"
-                )
-        if not 0 <= self.leak < 1:
-            raise BootifolError(f"context translation: leak is {self.leak}, but must be in [0, 1)")

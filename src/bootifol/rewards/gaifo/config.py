@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
-from bootifol.errors import BootifolError, require_choices
+from bootifol.errors import (
+    BootifolError,
+    fields_of,
+    require_at_least,
+    require_below_one,
+    require_choices,
+    require_positive,
+)
 
 
 @dataclass(frozen=True)
@@ -40,18 +48,12 @@ class GaifoConfig:
     """bf16 computes the network in bfloat16; parameters, losses and Adam stay in float32."""
 
     def __post_init__(self) -> None:
+        of_self = partial(fields_of, "gaifo", self)
         require_choices("gaifo", self)
-        for field, least in (
-            ("stack", 2),
-            ("videos_per_class", 1),
-            ("stacks_per_video", 1),
-            ("width_divisor", 1),
-        ):
-            if not getattr(self, field) >= least:
-                raise BootifolError(f"gaifo: {field} is {getattr(self, field)}, but must be at least {least}")
+        counts = ("videos_per_class", "stacks_per_video", "width_divisor")
+        require_at_least(1, **of_self(*counts))
+        require_at_least(2, **of_self("stack"))
+        require_positive(**of_self("learning_rate"))
+        require_below_one(**of_self("leak"))
         if self.width_divisor > 32:
-            raise BootifolError(f"gaifo: width_divisor is {self.width_divisor}, but must be at most 32")
-        if not 0 <= self.leak < 1:
-            raise BootifolError(f"gaifo: leak is {self.leak}, but must be in [0, 1)")
-        if not self.learning_rate > 0:
-            raise BootifolError(f"gaifo: learning_rate is {self.learning_rate}, but must be above 0")
+            raise BootifolError(f"gaifo: width_divisor must be at most 32, not {self.width_divisor}")

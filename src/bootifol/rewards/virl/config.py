@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
-from bootifol.errors import BootifolError, require_choices
+from bootifol.errors import (
+    BootifolError,
+    fields_of,
+    require_at_least,
+    require_below_one,
+    require_choices,
+    require_positive,
+    require_share,
+)
 
 
 @dataclass(frozen=True)
@@ -71,37 +80,23 @@ class VirlConfig:
     """bf16 computes the convolutions in bfloat16; parameters, LSTMs, losses and Adam stay in float32."""
 
     def __post_init__(self) -> None:
+        of_self = partial(fields_of, "virl", self)
         require_choices("virl", self)
-        for field in ("references", "width_divisor"):
-            if not getattr(self, field) >= 1:
-                raise BootifolError(f"virl: {field} is {getattr(self, field)}, but must be at least 1")
-        for field in ("margin", "learning_rate"):
-            if not getattr(self, field) > 0:
-                raise BootifolError(f"virl: {field} is {getattr(self, field)}, but must be above 0")
-        for field in ("sequence_triplet", "frame_triplet", "sequence_reconstruction", "frame_reconstruction"):
-            if not getattr(self, f"{field}_weight") >= 0:
-                raise BootifolError(
-                    f"virl: {field}_weight is {getattr(self, f'{field}_weight')}; use 0 to leave the loss out"
-                )
+        require_at_least(1, **of_self("references", "frames_per_video", "width_divisor"))
+        weights = ("sequence_triplet", "frame_triplet", "sequence_reconstruction", "frame_reconstruction")
+        require_at_least(0, **of_self("noise", *(f"{loss}_weight" for loss in weights)))
+        require_positive(**of_self("margin", "learning_rate"))
+        require_share(**of_self("altered_share"))
+        require_below_one(**of_self("frame_drop", "leak"))
         if not self.sequence_triplet_weight + self.frame_triplet_weight > 0:
             raise BootifolError(
                 "virl: sequence_triplet_weight and frame_triplet_weight are both 0, so no distance would be learned; "
                 "give one of them"
             )
-        if not self.noise >= 0:
-            raise BootifolError(f"virl: noise is {self.noise}; use 0 for none")
-        if not 0 <= self.altered_share <= 1:
-            raise BootifolError(f"virl: altered_share is {self.altered_share}, but must be in [0, 1]")
-        if not 0 <= self.frame_drop < 1:
-            raise BootifolError(f"virl: frame_drop is {self.frame_drop}, but must be in [0, 1)")
         if self.videos_per_class < 2:
             raise BootifolError(
                 f"virl: videos_per_class is {self.videos_per_class}, but a positive is another video of its anchor's "
                 "class, so it must be at least 2"
             )
-        if self.frames_per_video is not None and self.frames_per_video < 1:
-            raise BootifolError(
-                f"virl: frames_per_video is {self.frames_per_video}; use at least 1, or none for all"
-            )
         if self.width_divisor > 32:
-            raise BootifolError(f"virl: width_divisor is {self.width_divisor}, but must be at most 32")
+            raise BootifolError(f"virl: width_divisor must be at most 32, not {self.width_divisor}")
