@@ -74,6 +74,7 @@ CPU = TrainingConfig(
         cloning_weight=10.0,
         averaging=0.999,
         replay_capacity=40_000,
+        precision="bf16",
     ),
     augmentation=AugmentationConfig(when="imported"),
     alignment=AlignmentConfig(gradient_steps=500),

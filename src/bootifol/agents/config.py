@@ -96,8 +96,9 @@ class DrQv2Config:
     share of themselves at each update and so even out the noise of the last ones; 0, as in its paper, the newest.
     Until 1 / (1 - averaging) updates they are plain means, in which nothing is left of the initial parameters."""
 
-    precision: Precision = "bf16"
-    """Arithmetic of convolutions and matrix products; parameters, losses and Q values are always float32."""
+    precision: Precision = "fp32"
+    """Arithmetic of convolutions and matrix products, also of the inverse dynamics; parameters, losses and Q values are
+    always float32."""
 
     def __post_init__(self) -> None:
         of_self = partial(fields_of, "agent", self)
