@@ -4,11 +4,13 @@
     python -m benchmarks.stages --demos demos/reacher_hard --config.agent.update-every 8   # any field of the preset
 
 Every stage is timed on the preset's own sizes, with the videos and the replay of a run after its warm-up: medians of
-`--runs` calls after one that is not counted. How often each happens in the preset's own count of agent steps, without
-a time budget, follows from its configuration, so no run has to be played to its end; the final evaluation, the showcase
-and the report are not counted. The floor is what the machine
-could not beat: the stage's arithmetic, as PyTorch counts it, at the measured rate of a large bf16 matrix product.
-Markdown.
+`--runs` calls after one that is not counted; what takes seconds (all videos of a Cloning Phase, an evaluation, a
+checkpoint) is timed once, as it comes. How often each happens in the preset's own count of agent steps, without a time
+budget, follows from its configuration, so no run has to be played to its end; the final evaluation, the showcase and the
+report are not counted.
+
+"arithmetic ms" is what the multiplications and additions of our own code, as PyTorch counts them, would take at the
+measured rate of a large bf16 matrix product. What the work itself needs, and bytes, are in `benchmarks.engine`. Markdown.
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 from bootifol.types import Video, VideoSource
 
-HEADER = ("stage", "in a run", "ms each", "floor ms", "ms an agent step", "share")
+HEADER = ("stage", "in a run", "ms each", "arithmetic ms", "ms an agent step", "share")
 
 HIGHEST_RATE = 1e-4
 """Learning rate of the timed steps of the Cloning Phase: what it is changes no time."""
@@ -57,7 +59,7 @@ class Stage:
     """In a whole run."""
     work: Callable[[], object]
     computes: bool = True
-    """Whether a floor of arithmetic says something: not of simulation, rendering and files."""
+    """Whether its arithmetic says something: not of simulation, rendering and files."""
     slow: bool = False
     """Takes seconds, and is timed once."""
 
@@ -142,8 +144,7 @@ def reward_stages(run: Run, expert: VideoSource, agent_videos: VideoSource) -> I
     if updates:
         yield Stage("gradient step of the reward", updates, lambda: model.update(expert, agent_videos))
         if config.interactive.relabel_episodes:
-            renewed = updates * config.interactive.relabel_episodes
-            yield Stage("renewing a stored episode's rewards", renewed, interactive._relabel_one)
+            yield Stage("renewing stored rewards", updates, interactive._renew_rewards)
     video, numbers = parts.agent_videos[0], itertools.count()
     if parts.backbone is not None:
         backbone, size = parts.backbone, config.pictures.video_size
@@ -179,7 +180,7 @@ def warm_up(run: Run) -> None:
 
 
 def milliseconds(stage: Stage, runs: int) -> float:
-    """The median of some calls, quick ones in blocks, after one that is not counted."""
+    """The median of some calls, quick ones in blocks, after one that is not counted; of a slow stage the only one."""
     block = 1
     if stage.slow:
         runs = 1
@@ -196,14 +197,14 @@ def milliseconds(stage: Stage, runs: int) -> float:
     return statistics.median(times)
 
 
-def floor(stage: Stage, arithmetic: float) -> float | None:
-    """Milliseconds of its arithmetic at the machine's rate; None where there is none to count."""
+def arithmetic_milliseconds(stage: Stage, rate: float) -> float | None:
+    """Of its multiplications and additions at `rate` a second; None where there are none to count."""
     if not stage.computes:
         return None
     with FlopCounterMode(display=False) as counter:
         stage.work()
     operations: int = counter.get_total_flops()
-    return 1e3 * operations / arithmetic
+    return 1e3 * operations / rate
 
 
 def measure(
@@ -236,7 +237,7 @@ def measure(
         run.tracker = Tracker(Path(temporary), tensorboard=False)
         for stage in stages_of(run):
             each = milliseconds(stage, runs)
-            rows.append((stage, each, floor(stage, arithmetic)))
+            rows.append((stage, each, arithmetic_milliseconds(stage, arithmetic)))
             print(f"{stage.name}: {each:.2f} ms", file=sys.stderr, flush=True)
     total = sum(stage.calls * each for stage, each, _ in rows)
     cells = [
