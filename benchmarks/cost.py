@@ -5,8 +5,9 @@
 Measured is the Interactive Phase with everything in it: acting, rendering, updates of agent and reward, rewarding
 each episode; and apart from it a gradient step of alignment, of which a run takes as many as the table says. The
 Cloning Phases, the same for all methods, and evaluations are not measured here but by `benchmarks.stages`. Before the
-clock starts, a warm-up, one step of inverse dynamics and two episodes pass. Finished rows are kept: the same command
-goes on where it stopped. A Markdown table is written beside the CSV file.
+clock starts, a warm-up, one step of inverse dynamics and two episodes pass; replay then holds so little that a
+processor may keep it in its caches, which it cannot in a long run (`benchmarks.engine` times that). Finished rows are
+kept: the same command goes on where it stopped. A Markdown table is written beside the CSV file.
 """
 
 from __future__ import annotations
@@ -73,6 +74,8 @@ COLUMNS = {
 
 ALIGNMENT_STEPS = 8
 """Of which the first, which compiles and allocates, is not timed."""
+BLOCKS = 3
+"""Of agent steps that are timed; the median counts."""
 FEW_VIDEOS = 40
 """Recorded where the task has none."""
 DEMONSTRATIONS = 300
@@ -86,7 +89,9 @@ def main() -> None:
     )
     parser.add_argument("--task", default="reacher_hard")
     parser.add_argument("--preset", default="cpu", choices=list(PRESETS))
-    parser.add_argument("--steps", type=int, default=600, help="agent steps to time, twice")
+    parser.add_argument(
+        "--steps", type=int, default=300, help=f"agent steps of a block, {BLOCKS} of which are timed, twice"
+    )
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--systems", nargs="+", help="by name; all by default")
     parser.add_argument(
@@ -194,7 +199,7 @@ def measured(arguments: argparse.Namespace, system: System) -> dict[str, str]:
             "preset": arguments.preset,
             "system": system.name,
             "threads": str(arguments.threads),
-            "agent_steps": str(arguments.steps),
+            "agent_steps": str(BLOCKS * arguments.steps),
             "alignment_steps": str(config.alignment.gradient_steps if alignment else 0),
             "seconds_alignment": f"{alignment:.2f}" if alignment else "",
             "seconds_learning": f"{learning.wall_clock:.1f}",
@@ -259,15 +264,20 @@ class Seconds(NamedTuple):
 
 
 def seconds_per_1000(run: Run, agent_steps: int) -> Seconds:
-    """Plays whole episodes, as many as have so many agent steps, after one that is not timed."""
+    """The median of a few blocks of whole episodes, of so many agent steps each, after an episode that is not timed."""
     run.interactive.play_episode()
-    first, started, cpu_started = run.counters.agent_steps, time.perf_counter(), time.process_time()
-    while run.counters.agent_steps - first < agent_steps:
-        run.interactive.play_episode()
-    thousands = (run.counters.agent_steps - first) / 1000
-    return Seconds(
-        (time.perf_counter() - started) / thousands, (time.process_time() - cpu_started) / thousands
-    )
+    blocks = []
+    for _ in range(BLOCKS):
+        first, started, cpu_started = run.counters.agent_steps, time.perf_counter(), time.process_time()
+        while run.counters.agent_steps - first < agent_steps:
+            run.interactive.play_episode()
+        thousands = (run.counters.agent_steps - first) / 1000
+        blocks.append(
+            Seconds(
+                (time.perf_counter() - started) / thousands, (time.process_time() - cpu_started) / thousands
+            )
+        )
+    return sorted(blocks)[BLOCKS // 2]
 
 
 def stores_when_full(config: TrainingConfig, run: Run) -> int:

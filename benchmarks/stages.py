@@ -5,12 +5,13 @@
 
 Every stage is timed on the preset's own sizes, with the videos and the replay of a run after its warm-up: medians of
 `--runs` calls after one that is not counted; what takes seconds (all videos of a Cloning Phase, an evaluation, a
-checkpoint) is timed once, as it comes. How often each happens in the preset's own count of agent steps, without a time
-budget, follows from its configuration, so no run has to be played to its end; the final evaluation, the showcase and the
-report are not counted.
+checkpoint) is timed once, as it comes. How often each happens in the preset's own count of agent steps, without a
+time budget, follows from its configuration, so no run has to be played to its end; the final evaluation, the showcase
+and the report are not counted.
 
 "arithmetic ms" is what the multiplications and additions of our own code, as PyTorch counts them, would take at the
-measured rate of a large bf16 matrix product. What the work itself needs, and bytes, are in `benchmarks.engine`. Markdown.
+measured rate of a large bf16 matrix product. What the work itself needs, and bytes, are in `benchmarks.engine`.
+Markdown.
 """
 
 from __future__ import annotations

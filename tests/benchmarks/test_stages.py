@@ -51,7 +51,7 @@ def test_how_often_a_stage_happens_follows_from_the_configuration(demos: Path, t
         "batch from replay": 18,
         "update of the agent": 18,
         "gradient step of the reward": 4,  # (160 - 60) / 25
-        "renewing a stored episode's rewards": 12,
+        "renewing stored rewards": 4,
         "rewarding an episode while the reward learns": 160 / 30,
         "rewarding an episode when it rests": 80 / 30,
         "evaluation on the way": 2 + 2,  # and one after each of the Cloning Phases, at 60 and 150
@@ -74,6 +74,6 @@ def test_the_true_reward_learns_and_rewards_nothing(demos: Path, tmp_path: Path)
 def test_the_table_names_every_stage_and_the_whole(demos: Path, capsys: pytest.CaptureFixture[str]) -> None:
     measure(CONFIG, demos, "drawn_home", preset="smoke", runs=1)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[2].startswith("| stage | in a run | ms each | floor ms | ms an agent step | share |")
+    assert lines[2].startswith("| stage | in a run | ms each | arithmetic ms | ms an agent step | share |")
     assert lines[4].startswith("| alignment step | 4 |")
     assert lines[-1].startswith("| all | 240 agent steps |")
