@@ -328,19 +328,6 @@ def test_state_is_exact(tmp_path, precision, averaging) -> None:
         np.testing.assert_array_equal(array, states[1][name])
 
 
-def test_averages_of_an_older_checkpoint_go_on_slowly() -> None:
-    agent = make_agent(dataclasses.replace(SMALL, averaging=0.75))
-    agent.update(make_batch(), 0)
-    state = agent.state()
-    del state["averages"]
-    agent.load_state(state)
-    agent.update(make_batch(1), 0)
-    after = agent.state()
-    name = next(name for name in after if name.startswith("averaged_actor.") and "/" not in name)
-    expected = 0.75 * state[name] + 0.25 * after[name.removeprefix("averaged_")]
-    np.testing.assert_allclose(after[name], expected, rtol=1e-5, atol=1e-7)
-
-
 def test_a_state_before_any_update_forgets_the_optimizers() -> None:
     agent, used = make_agent(), make_agent(seed=3)
     used.update(make_batch(3), 0)

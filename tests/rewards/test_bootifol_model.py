@@ -67,14 +67,15 @@ def test_label_is_the_distance_of_prefix_encodings() -> None:
     video, reference = OTHER[0], EXPERT[1]
     rewards = model.label(video, [reference])
     assert rewards.dtype == np.float32
-    difference = model.embed(video.frames)[1:] - model.embed(reference.frames)[1:]
+    z, z_expert = (encoding[1:].numpy() for encoding in model._encode([video, reference]))
+    difference = z - z_expert
     np.testing.assert_allclose(rewards, -np.linalg.norm(difference, axis=1), rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(model.label(reference, [reference]), 0.0, atol=1e-5)
 
 
 def test_cosine_reward() -> None:
     model = aligned(2, replace(SMALL, reward="cosine"))
-    z, z_expert = model.embed(OTHER[0].frames)[1:], model.embed(EXPERT[1].frames)[1:]
+    z, z_expert = (encoding[1:].numpy() for encoding in model._encode([OTHER[0], EXPERT[1]]))
     cosine = (z * z_expert).sum(1) / np.linalg.norm(z, axis=1) / np.linalg.norm(z_expert, axis=1)
     np.testing.assert_allclose(model.label(OTHER[0], [EXPERT[1]]), cosine, rtol=1e-4)
 

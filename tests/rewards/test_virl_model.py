@@ -136,8 +136,8 @@ def test_label_is_minus_the_distance_of_the_encodings(reward: str) -> None:
     video, reference = OTHER[0], EXPERT[1]
     rewards = model.label(video, [reference])
     assert rewards.dtype == np.float32
-    difference = model.embed(video.frames)[1:] - model.embed(reference.frames)[1:]
-    frames, sequences = (np.linalg.norm(part, axis=1) for part in np.split(difference, 2, axis=1))
+    encodings = zip(model._encode(video.frames), model._encode(reference.frames), strict=True)
+    frames, sequences = (np.linalg.norm(own - expert, axis=1)[1:] for own, expert in encodings)
     expected = {"both": frames + sequences, "sequence": sequences, "frame": frames}[reward]
     np.testing.assert_allclose(rewards, -expected, rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(model.label(reference, [reference]), 0.0, atol=1e-5)

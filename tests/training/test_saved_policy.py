@@ -70,10 +70,10 @@ def test_its_actions_are_those_of_the_runs_evaluation_bit_for_bit(
     assert (alone.config.frames_per_second, alone.config.action_repeat) == (10.0, 1)
     assert alone.config.pictures == PICTURES
 
-    shutil.copytree(finished, tmp_path / "older", ignore=shutil.ignore_patterns("policy.safetensors"))
-    older = bootifol.load_policy(tmp_path / "older")
-    assert_same_actions(older, episodes)
-    assert older.config == alone.config
+    shutil.copytree(finished, tmp_path / "without", ignore=shutil.ignore_patterns("policy.safetensors"))
+    restored = bootifol.load_policy(tmp_path / "without")
+    assert_same_actions(restored, episodes)
+    assert restored.config == alone.config
 
 
 def test_it_is_a_small_part_of_the_checkpoint(finished: Path) -> None:

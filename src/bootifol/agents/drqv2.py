@@ -300,8 +300,7 @@ class DrQv2:
                     state[key] = value.to(memory_format=torch.channels_last) if value.dim() == 4 else value
         self._generator.set_state(torch.from_numpy(arrays["generator"].copy()))
         if self._averaged is not None:
-            # A checkpoint of before they were counted goes on as it did.
-            self._averages = int(arrays["averages"][0]) if "averages" in arrays else 10**9
+            self._averages = int(arrays["averages"][0])
 
     def _parameters(self) -> dict[str, Tensor]:
         networks: dict[str, nn.Module] = {

@@ -137,8 +137,7 @@ class AgentVideos:
                 f"{list(kept.shape)}: resume with the configuration of the run that saved them"
             )
         kept[: len(saved)] = saved
-        if "rewards" in arrays:  # a checkpoint of before they were kept has none
-            self._rewards[: len(saved)] = arrays["rewards"]
+        self._rewards[: len(saved)] = arrays["rewards"]
         self._names = json.loads(arrays["names"].tobytes())
         self._next = int(arrays["next"][0])
 

@@ -20,8 +20,8 @@ NAME = "policy.safetensors"
 def load_policy(run: AnyPath) -> Policy:
     """A run's newest policy, to act with outside of this library; it computes on the CPU.
 
-    A run that acts on encodings, or was written before runs had a `policy.safetensors`, is read from its newest
-    checkpoint, which needs the environment's packages.
+    A run that acts on encodings has no `policy.safetensors` and is read from its newest checkpoint, which needs the
+    environment's packages.
 
     Args:
         run: the run's directory, or its `policy.safetensors` alone, wherever it was copied to.

@@ -107,10 +107,6 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
             reward = self._scale.rewards(reward)
         return to_host(reward)
 
-    def embed(self, frames: Frames) -> NDArray[np.float32]:
-        """Encodings z of every prefix of a video: `[T + 1, H, W, 3]` to `[T + 1, 128]`."""
-        return to_host(self._encode([Video("", frames)])[0])
-
     def encode_frames(self, frames: Frames) -> torch.Tensor:
         """s = g(o) of single frames: uint8 `[N, H, W, 3]` to float32 `[N, 128]`, without gradients."""
         states = self._frame_states(self._checked(frames))

@@ -73,10 +73,6 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
             distances.append(self._distance(frames - expert_frames, sequences - expert_sequences))
         return to_host(-torch.stack(distances).mean(0)[1:])
 
-    def embed(self, frames: Frames) -> NDArray[np.float32]:
-        """e and h of a video, side by side: `[T + 1, H, W, 3]` to `[T + 1, 256]`."""
-        return to_host(torch.cat(self._encode(frames), dim=1))
-
     def load_state(self, arrays: Arrays) -> None:
         """The inverse of `state`."""
         super().load_state(arrays)
