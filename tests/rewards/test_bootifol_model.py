@@ -67,15 +67,14 @@ def test_label_is_the_distance_of_prefix_encodings() -> None:
     video, reference = OTHER[0], EXPERT[1]
     rewards = model.label(video, [reference])
     assert rewards.dtype == np.float32
-    z, z_expert = (encoding[1:].numpy() for encoding in model._encode([video, reference]))
-    difference = z - z_expert
+    difference = (model._encode(video) - model._encode(reference))[1:].numpy()
     np.testing.assert_allclose(rewards, -np.linalg.norm(difference, axis=1), rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(model.label(reference, [reference]), 0.0, atol=1e-5)
 
 
 def test_cosine_reward() -> None:
     model = aligned(2, replace(SMALL, reward="cosine"))
-    z, z_expert = (encoding[1:].numpy() for encoding in model._encode([OTHER[0], EXPERT[1]]))
+    z, z_expert = (model._encode(video)[1:].numpy() for video in (OTHER[0], EXPERT[1]))
     cosine = (z * z_expert).sum(1) / np.linalg.norm(z, axis=1) / np.linalg.norm(z_expert, axis=1)
     np.testing.assert_allclose(model.label(OTHER[0], [EXPERT[1]]), cosine, rtol=1e-4)
 
@@ -84,20 +83,20 @@ def test_references_are_encoded_once_for_each_version_of_the_encoders(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     model = aligned(1)
-    encoded: list[int] = []
+    encoded: list[str] = []
     encode = model._encode
-    monkeypatch.setattr(model, "_encode", lambda videos: encoded.append(len(videos)) or encode(videos))
+    monkeypatch.setattr(model, "_encode", lambda video: encoded.append(video.name) or encode(video))
     model.label(OTHER[0], [EXPERT[0]])
     model.label(OTHER[1], [EXPERT[0]])
     model.label(OTHER[1], [EXPERT[1]])
-    assert encoded == [2, 1, 2]
+    assert encoded == ["other-0", "expert-0", "other-1", "other-1", "expert-1"]
     old = model.label(OTHER[1], [EXPERT[0]])
     version = model.version
     model.update(EXPERT, OTHER)
     assert model.version == version + 1
     encoded.clear()
     assert not np.array_equal(model.label(OTHER[1], [EXPERT[0]]), old)
-    assert encoded == [2]
+    assert encoded == ["other-1", "expert-0"]
 
 
 @pytest.mark.parametrize("aggregate", ["mean", "min", "soft_min"])

@@ -136,7 +136,7 @@ def test_label_is_minus_the_distance_of_the_encodings(reward: str) -> None:
     video, reference = OTHER[0], EXPERT[1]
     rewards = model.label(video, [reference])
     assert rewards.dtype == np.float32
-    encodings = zip(model._encode(video.frames), model._encode(reference.frames), strict=True)
+    encodings = zip(model._encode(video), model._encode(reference), strict=True)
     frames, sequences = (np.linalg.norm(own - expert, axis=1)[1:] for own, expert in encodings)
     expected = {"both": frames + sequences, "sequence": sequences, "frame": frames}[reward]
     np.testing.assert_allclose(rewards, -expected, rtol=1e-4, atol=1e-6)
@@ -153,9 +153,9 @@ def test_several_references_are_averaged() -> None:
 
 def test_references_are_encoded_once_for_each_version(monkeypatch: pytest.MonkeyPatch) -> None:
     model = trained(1)
-    encoded: list[int] = []
+    encoded: list[str] = []
     encode = model._encode
-    monkeypatch.setattr(model, "_encode", lambda frames: encoded.append(len(frames)) or encode(frames))
+    monkeypatch.setattr(model, "_encode", lambda video: encoded.append(video.name) or encode(video))
     first = model.label(OTHER[0], [EXPERT[0]])
     np.testing.assert_array_equal(model.label(OTHER[0], [EXPERT[0]]), first)
     assert len(encoded) == 3

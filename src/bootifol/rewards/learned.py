@@ -1,10 +1,10 @@
-"""What the reward models that learn have in common: networks, their optimizer, random draws, and their state."""
+"""What the reward models that learn have in common: networks, optimizer, random draws, kept encodings, and state."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import torch
@@ -16,7 +16,7 @@ from bootifol.devices import to_device
 from bootifol.rewards.gradient_step import GradientStep
 from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
 from bootifol.rewards.video_checks import checked_videos
-from bootifol.types import Arrays, FrameBatch, Frames, VideoSource
+from bootifol.types import Arrays, FrameBatch, Frames, Video, VideoSource
 
 
 class LearnedConfig(Protocol):
@@ -38,6 +38,7 @@ NORMALIZATION_MOMENTUM = 0.1
 
 Config = TypeVar("Config", bound=LearnedConfig)
 Networks = TypeVar("Networks", bound=nn.Module)
+Encoding = TypeVar("Encoding")
 
 
 class LearnedRewardModel(Generic[Config, Networks]):
@@ -64,6 +65,7 @@ class LearnedRewardModel(Generic[Config, Networks]):
         self.config = config
         self.video_size = video_size
         self.device = torch.device(device)
+        self._kept_encodings: dict[str, Any] = {}
         self.version = 0
         # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
         with torch.random.fork_rng(devices=[]):
@@ -73,6 +75,16 @@ class LearnedRewardModel(Generic[Config, Networks]):
         self._normalizations = [layer for layer in self.networks.modules() if isinstance(layer, _BatchNorm)]
         self._optimizer = torch.optim.Adam(self.networks.parameters(), lr=config.learning_rate, fused=True)
         self._rng = np.random.default_rng(seed)
+
+    @property
+    def version(self) -> int:
+        """Counts gradient steps. Whatever sets it, a step or `load_state`, forgets the encodings kept so far."""
+        return self._version
+
+    @version.setter
+    def version(self, version: int) -> None:
+        self._version = version
+        self._kept_encodings.clear()
 
     def state(self) -> Arrays:
         """Parameters, normalization statistics, Adam, random state and version."""
@@ -100,6 +112,16 @@ class LearnedRewardModel(Generic[Config, Networks]):
         """One video, uint8 `[T + 1, H, W, 3]` of the model's size."""
         video: Frames = checked_videos(frames[None], self.video_size)[0]
         return video
+
+    def _encoded_once(
+        self, references: Sequence[Video], encode: Callable[[Video], Encoding]
+    ) -> list[Encoding]:
+        """What `encode` makes of each reference, kept by the reference's name until `version` is set."""
+        kept = self._kept_encodings
+        for reference in references:
+            if reference.name not in kept:
+                kept[reference.name] = encode(reference)
+        return [kept[reference.name] for reference in references]
 
     def _on_device(self, array: NDArray[np.generic]) -> torch.Tensor:
         """An array of the host as a tensor where the networks compute."""

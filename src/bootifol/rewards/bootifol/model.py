@@ -72,7 +72,6 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         )
         self.reference_count = config.references
         self._scale = DistanceScale()
-        self._encodings: dict[str, torch.Tensor] = {}
 
     def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
         """Alignment Phase: one gradient step on n expert and n other (random) videos for every item taken."""
@@ -93,11 +92,8 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         """
         check_references(video, references, self.reference_count)
         length = len(video.frames)
-        missing = {item.name: item for item in references if item.name not in self._encodings}
-        fresh = self._encode([video, *missing.values()])
-        self._encodings.update(zip(missing, fresh[1:], strict=True))
-        encoding = fresh[0][1:]
-        compared = torch.stack([self._encodings[item.name][1:length] for item in references])
+        encoding = self._encode(video)[1:]
+        compared = torch.stack([z[1:length] for z in self._encoded_once(references, self._encode)])
         if self.config.reward == "cosine":
             rewards = torch.nn.functional.cosine_similarity(encoding[None], compared, dim=2)
         else:
@@ -132,7 +128,6 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
                 "restore the weights, or start a new run"
             )
         self._scale.means = arrays["reward_scale"].astype(np.float64)
-        self._encodings.clear()
 
     def _step(self, expert: VideoSource, other: VideoSource, scaling: bool) -> Metrics:
         """Algorithm 1: sample n and n videos, evaluate L, optimize theta, gamma, omega, phi."""
@@ -151,7 +146,6 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         # In float64, of which the scale is made; the host has waited for the step just now.
         measured = to_host(distances).astype(np.float64)
         self.version += 1
-        self._encodings.clear()
         if scaling:
             self._scale.observe(drawn.kept, measured[: n - spoiled_count].mean(0))
         return {**metrics, "distance/expert_other": float(measured.mean())}
@@ -214,18 +208,16 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
             distances = torch.linalg.vector_norm(expert - other, dim=2)
         return total, {f"loss/{name}": term for name, term in terms.items()}, distances
 
-    def _encode(self, videos: Sequence[Video]) -> list[torch.Tensor]:
-        """Encodings `[T + 1, 128]` of each video, in evaluation mode: a frame's state depends on that frame alone.
+    def _encode(self, video: Video) -> torch.Tensor:
+        """Encodings z `[T + 1, 128]` of a video, in evaluation mode: a frame's state depends on that frame alone.
 
-        Each video is encoded by itself: the last bits of a matrix product depend on how many rows it has, and a
+        Videos are encoded one by one: the last bits of a matrix product depend on how many rows it has, and a
         resumed run may encode a reference beside another video than the uninterrupted run did.
         """
-        encodings: list[torch.Tensor] = []
-        for video in videos:
-            states = self._frame_states(self._checked_inputs(video))
-            with self._evaluating():
-                encodings.append(self.networks.sequence_encoder(states[None])[0][0])
-        return encodings
+        states = self._frame_states(self._checked_inputs(video))
+        with self._evaluating():
+            encodings: torch.Tensor = self.networks.sequence_encoder(states[None])[0][0]
+            return encodings
 
     def _frame_states(self, frames: Frames | Features) -> torch.Tensor:
         """s `[N, 128]` of frames, or of their features, in evaluation mode."""

@@ -15,7 +15,7 @@ from bootifol.rewards.virl import losses
 from bootifol.rewards.virl.config import VirlConfig
 from bootifol.rewards.virl.networks import VirlNetworks
 from bootifol.rewards.virl.sampling import Draw, draw
-from bootifol.types import Arrays, FrameBatch, Frames, Metrics, Rewards, StepMetrics, Video, VideoSource
+from bootifol.types import FrameBatch, Frames, Metrics, Rewards, StepMetrics, Video, VideoSource
 
 PAIR = 2
 """Eq. (4) reconstructs the anchor and its positive. Positives come from the same videos as anchors, so every anchor is
@@ -37,7 +37,6 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
     def __init__(self, config: VirlConfig, video_size: int, seed: int, device: str = "cpu") -> None:
         super().__init__(VirlNetworks, config, video_size, seed, device)
         self.reference_count = config.references
-        self._encodings: dict[str, tuple[torch.Tensor, torch.Tensor]] = {}
 
     def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
         """Yields nothing: the distance is learned from the agent's own videos alone."""
@@ -53,7 +52,6 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
         step = self._begin_step()
         metrics = step.take(*self._losses(videos, drawn))
         self.version += 1
-        self._encodings.clear()
         return metrics
 
     def label(self, video: Video, references: Sequence[Video]) -> Rewards:
@@ -62,21 +60,13 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
         Encodings of the references are kept until the encoders change.
         """
         check_references(video, references, self.reference_count)
-        for reference in references:
-            if reference.name not in self._encodings:
-                self._encodings[reference.name] = self._encode(reference.frames)
         length = len(video.frames)
-        frames, sequences = self._encode(video.frames)
-        distances = []
-        for reference in references:
-            expert_frames, expert_sequences = (part[:length] for part in self._encodings[reference.name])
-            distances.append(self._distance(frames - expert_frames, sequences - expert_sequences))
+        frames, sequences = self._encode(video)
+        distances = [
+            self._distance(frames - expert_frames[:length], sequences - expert_sequences[:length])
+            for expert_frames, expert_sequences in self._encoded_once(references, self._encode)
+        ]
         return to_host(-torch.stack(distances).mean(0)[1:])
-
-    def load_state(self, arrays: Arrays) -> None:
-        """The inverse of `state`."""
-        super().load_state(arrays)
-        self._encodings.clear()
 
     def _losses(self, videos: FrameBatch, drawn: Draw) -> tuple[torch.Tensor, StepMetrics]:
         """L and its terms on n expert videos followed by n of the agent, uint8 `[2n, T' + 1, H, W, 3]`."""
@@ -147,11 +137,11 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
             return of_frames
         return of_sequences if self.config.reward == "sequence" else of_frames + of_sequences
 
-    def _encode(self, frames: Frames) -> tuple[torch.Tensor, torch.Tensor]:
+    def _encode(self, video: Video) -> tuple[torch.Tensor, torch.Tensor]:
         """e and h, each `[T + 1, 128]`, in evaluation mode: a frame's e depends on that frame alone."""
         with self._evaluating():
             with self._autocast():
-                encodings = self.networks.encode_frames(self._pictures(self._checked(frames)))
+                encodings = self.networks.encode_frames(self._pictures(self._checked(video.frames)))
             return encodings, self.networks.encode_sequences(encodings[None])[0]
 
     def _pictures(self, frames: Frames) -> torch.Tensor:
