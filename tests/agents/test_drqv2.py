@@ -333,8 +333,8 @@ def test_a_state_before_any_update_forgets_the_optimizers() -> None:
     used.update(make_batch(3), 0)
     used.load_state(agent.state())
     assert agent.update(make_batch(1), 0) == used.update(make_batch(1), 0)
-    np.testing.assert_array_equal(agent.state()["step/encoder.first.weight"], 1)
-    np.testing.assert_array_equal(used.state()["step/encoder.first.weight"], 1)
+    np.testing.assert_array_equal(agent.state()["critic_adam/step/encoder.first.weight"], 1)
+    np.testing.assert_array_equal(used.state()["critic_adam/step/encoder.first.weight"], 1)
 
 
 def test_state_is_a_copy() -> None:

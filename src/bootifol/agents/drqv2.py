@@ -9,11 +9,9 @@ not, and exploration noise on a linear schedule, which also smooths the targets.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from bootifol.agents.config import DrQv2Config
@@ -22,6 +20,7 @@ from bootifol.agents.gradient_step import take_step
 from bootifol.agents.networks import Actor, Critic, Encoder, EncodingEncoder, as_batch, initialize
 from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
+from bootifol.module_state import load_module_state, module_state
 from bootifol.types import Action, Arrays, Batch, Observation, StepMetrics
 
 SATURATED = 0.98
@@ -269,11 +268,8 @@ class DrQv2:
 
     def state(self) -> Arrays:
         """Copies of all parameters, of the optimizers and of the noise generator."""
-        arrays = {name: _copied(parameter) for name, parameter in self._parameters().items()}
-        for name, prefix, state in self._optimizer_states():
-            for key, value in state.items():
-                arrays[f"{prefix}{key}/{name}"] = _copied(value)
-        arrays["generator"] = _copied(self._generator.get_state())
+        arrays = module_state(self._networks(), self._optimizers())
+        arrays["generator"] = self._generator.get_state().numpy()
         if self._averaged is not None:
             arrays["averages"] = np.array([self._averages], np.int64)
         return arrays
@@ -284,25 +280,12 @@ class DrQv2:
         Raises:
             BootifolError: the arrays belong to networks of other sizes.
         """
-        for name, parameter in self._parameters().items():
-            if name not in arrays or arrays[name].shape != tuple(parameter.shape):
-                raise BootifolError(
-                    f"the saved agent does not fit this one: {name} should be {tuple(parameter.shape)}; "
-                    "use the configuration it was saved with"
-                )
-            with torch.no_grad():
-                parameter.copy_(torch.from_numpy(arrays[name]))
-        for name, prefix, state in self._optimizer_states():
-            state.clear()
-            for key in ("step", "exp_avg", "exp_avg_sq"):
-                if f"{prefix}{key}/{name}" in arrays:
-                    value = torch.from_numpy(arrays[f"{prefix}{key}/{name}"].copy()).to(self._device)
-                    state[key] = value.to(memory_format=torch.channels_last) if value.dim() == 4 else value
+        load_module_state(self._networks(), self._optimizers(), arrays, "agent")
         self._generator.set_state(torch.from_numpy(arrays["generator"].copy()))
         if self._averaged is not None:
             self._averages = int(arrays["averages"][0])
 
-    def _parameters(self) -> dict[str, Tensor]:
+    def _networks(self) -> nn.ModuleDict:
         networks: dict[str, nn.Module] = {
             "encoder": self.encoder,
             "actor": self.actor,
@@ -311,23 +294,14 @@ class DrQv2:
         }
         if self._averaged is not None:
             networks["averaged_encoder"], networks["averaged_actor"] = self._averaged
-        return {
-            f"{network_name}.{name}": parameter
-            for network_name, network in networks.items()
-            for name, parameter in network.named_parameters()
-        }
+        return nn.ModuleDict(networks)
 
-    def _optimizer_states(self) -> Iterator[tuple[str, str, dict[str, Tensor]]]:
-        """Of each parameter that an optimizer holds: its name, a prefix for the optimizer, and what it keeps."""
-        optimizers = (
-            ("", self._critic_optimizer),
-            ("", self._actor_optimizer),
-            ("cloning_", self._cloning_optimizer),
-        )
-        for name, parameter in self._parameters().items():
-            for prefix, optimizer in optimizers:
-                if any(parameter is held for held in optimizer.param_groups[0]["params"]):
-                    yield name, prefix, optimizer.state[parameter]
+    def _optimizers(self) -> dict[str, torch.optim.Adam]:
+        return {
+            "critic_adam": self._critic_optimizer,
+            "actor_adam": self._actor_optimizer,
+            "cloning_adam": self._cloning_optimizer,
+        }
 
     def _network_input(self, observation: Tensor, dtype: torch.dtype) -> Tensor:
         """What the encoder reads of pictures uint8 `[B, 3 * stack, S, S]`: they themselves, or their encodings."""
@@ -357,7 +331,3 @@ def _to_channels_last(network: nn.Module) -> None:
     for parameter in network.parameters():
         if parameter.dim() == 4:
             parameter.data = parameter.data.to(memory_format=torch.channels_last)
-
-
-def _copied(tensor: Tensor) -> NDArray[np.generic]:
-    return to_host(tensor).copy()

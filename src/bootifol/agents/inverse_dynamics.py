@@ -15,6 +15,7 @@ from bootifol.agents.config import EncoderName, Precision
 from bootifol.agents.gradient_step import take_step
 from bootifol.agents.networks import Encoder
 from bootifol.devices import to_device, to_host
+from bootifol.module_state import load_module_state, module_state
 from bootifol.types import Arrays, Batch, Frames, StepMetrics
 
 
@@ -99,24 +100,15 @@ class InverseDynamics:
 
     def state(self) -> Arrays:
         """Parameters and optimizer."""
-        arrays: Arrays = {}
-        for name, parameter in self.network.named_parameters():
-            arrays[name] = to_host(parameter).copy()
-            for key, value in self._optimizer.state[parameter].items():
-                arrays[f"{key}/{name}"] = to_host(value).copy()
-        return arrays
+        return module_state(self.network, {"adam": self._optimizer})
 
     def load_state(self, arrays: Arrays) -> None:
-        """Restores what `state` returned, bit for bit."""
-        for name, parameter in self.network.named_parameters():
-            with torch.no_grad():
-                parameter.copy_(torch.from_numpy(arrays[name]))
-            for key in ("step", "exp_avg", "exp_avg_sq"):
-                if f"{key}/{name}" in arrays:
-                    value = torch.from_numpy(arrays[f"{key}/{name}"].copy()).to(self._device)
-                    if value.dim() == 4:
-                        value = value.to(memory_format=torch.channels_last)
-                    self._optimizer.state[parameter][key] = value
+        """Restores what `state` returned, bit for bit.
+
+        Raises:
+            BootifolError: the arrays belong to networks of other sizes.
+        """
+        load_module_state(self.network, {"adam": self._optimizer}, arrays, "inverse dynamics")
 
     def _predict(self, before: Tensor, after: Tensor) -> Tensor:
         """Actions `[B, A]` from two stacks, uint8 `[B, 3 * stack, S, S]` each."""

@@ -13,8 +13,8 @@ from torch import nn
 from torch.nn.modules.batchnorm import _BatchNorm
 
 from bootifol.devices import to_device
+from bootifol.module_state import generator_array, load_generator, load_module_state, module_state
 from bootifol.rewards.gradient_step import GradientStep
-from bootifol.rewards.module_state import generator_array, load_generator, load_module_state, module_state
 from bootifol.rewards.video_checks import checked_videos
 from bootifol.types import Arrays, FrameBatch, Frames, Video, VideoSource
 
@@ -89,7 +89,7 @@ class LearnedRewardModel(Generic[Config, Networks]):
     def state(self) -> Arrays:
         """Parameters, normalization statistics, Adam, random state and version."""
         return {
-            **module_state(self.networks, self._optimizer),
+            **module_state(self.networks, {"adam": self._optimizer}, "network/"),
             "random": generator_array(self._rng),
             "version": np.array([self.version], dtype=np.int64),
         }
@@ -100,7 +100,7 @@ class LearnedRewardModel(Generic[Config, Networks]):
         Raises:
             BootifolError: an array is missing or has another shape (the run had another configuration).
         """
-        load_module_state(self.networks, self._optimizer, arrays)
+        load_module_state(self.networks, {"adam": self._optimizer}, arrays, "reward model", "network/")
         load_generator(self._rng, arrays["random"])
         self.version = int(arrays["version"][0])
 

@@ -30,7 +30,7 @@ from bootifol.files import read_arrays, read_json, write_arrays, write_json, wri
 from bootifol.training.budget import Counters
 from bootifol.types import Arrays
 
-FORMAT = 1
+FORMAT = 2
 _NAME = re.compile(r"\d{12}-\d{9}")
 """Of a checkpoint's directory; whatever else lies beside it is somebody's own."""
 
