@@ -14,7 +14,18 @@ PACKAGE = Path(bootifol.__file__).parent
 LAYERS = ["envs", "experts", "demos", "networks", "rewards", "replay", "agents", "evaluation", "reports"]
 """From the videos to the report; a layer may import those before it."""
 
-SHARED = {"types", "errors", "files", "devices", "progress", "tasks", "memory", "module_state", "own_modules"}
+SHARED = {
+    "types",
+    "errors",
+    "files",
+    "devices",
+    "gradient_step",
+    "progress",
+    "tasks",
+    "memory",
+    "module_state",
+    "own_modules",
+}
 """Modules without a place in the order: everyone may import them."""
 
 ABOVE = {"training", "cli", "presets", "tracking"}

@@ -16,10 +16,10 @@ from torch import Tensor, nn
 
 from bootifol.agents.config import DrQv2Config
 from bootifol.agents.encodings import FrameEncodings
-from bootifol.agents.gradient_step import take_step
 from bootifol.agents.networks import Actor, Critic, Encoder, EncodingEncoder, as_batch, initialize
 from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
+from bootifol.gradient_step import take_step
 from bootifol.module_state import load_module_state, module_state
 from bootifol.types import Action, Arrays, Batch, Observation, StepMetrics
 

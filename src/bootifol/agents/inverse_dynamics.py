@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from bootifol.agents.config import EncoderName, Precision
-from bootifol.agents.gradient_step import take_step
 from bootifol.agents.networks import Encoder
 from bootifol.devices import to_device, to_host
+from bootifol.gradient_step import take_step
 from bootifol.module_state import load_module_state, module_state
 from bootifol.types import Arrays, Batch, Frames, StepMetrics
 

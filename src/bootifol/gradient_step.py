@@ -1,10 +1,18 @@
-"""A gradient step that is taken whole or not at all."""
+"""Gradient steps that no loss which is not finite may take, by two rules.
+
+`GradientStep`, of reward models, is taken whole or not at all: it looks at the loss and at the length of the gradient,
+and gives back the normalization statistics of the forward pass. The host waits for a GPU once a step, when it fetches
+the metrics.
+
+`take_step`, of the agent and its inverse dynamics, looks at the loss alone and never waits for a GPU, which works off
+their many small steps while the host goes on. Their networks have no statistics to give back.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from bootifol.devices import to_floats
 from bootifol.errors import BootifolError
@@ -27,7 +35,7 @@ class GradientStep:
         self._statistics = [buffer.clone() for buffer in module.buffers()]
         optimizer.zero_grad(set_to_none=True)
 
-    def take(self, loss: torch.Tensor, metrics: StepMetrics) -> Metrics:
+    def take(self, loss: Tensor, metrics: StepMetrics) -> Metrics:
         """Follows the gradient of `loss`.
 
         Returns:
@@ -59,3 +67,30 @@ class GradientStep:
                 f"the reward model's loss is not a finite number at its gradient step {self._number} ({named}); the "
                 "step was not taken: lower the reward's learning_rate in the run's config.json"
             )
+
+
+def take_step(optimizer: torch.optim.Adam, loss: Tensor, of_what: str, advice: str) -> None:
+    """Follows the gradient of a loss, unless it is NaN or infinite.
+
+    A CPU has the loss at hand and refuses it at once. On a GPU the host would have to wait for it, in the middle of an
+    update: there the optimizer skips the step itself, as it does for `torch.amp.GradScaler`, and the error comes when
+    the loss is logged (`tracking.Averages`).
+
+    Args:
+        optimizer: fused, of one group of parameters.
+        loss: what it makes smaller, a scalar.
+        of_what: names the loss in the error, such as "the agent's critic".
+        advice: what to do then.
+
+    Raises:
+        BootifolError: on a CPU, where the loss is not finite; the parameters are as before.
+    """
+    finite = torch.isfinite(loss.detach())
+    if loss.device.type != "cpu":
+        optimizer.found_inf = (~finite).float()  # type: ignore[attr-defined]
+    elif not finite:
+        raise BootifolError(f"the loss of {of_what} is {float(loss.detach())}; {advice}")
+    optimizer.zero_grad(set_to_none=True)
+    # Naming the inputs spares the actor's loss the gradients of the critic's weights.
+    torch.autograd.backward(loss, inputs=optimizer.param_groups[0]["params"])
+    optimizer.step()
