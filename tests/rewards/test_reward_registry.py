@@ -1,4 +1,5 @@
 import re
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,10 @@ CONFIG = RewardConfig(
     ContextTranslationConfig(width_divisor=32),
     GaifoConfig(width_divisor=32),
 )
+
+
+def test_every_method_that_learns_has_a_section_of_its_name() -> None:
+    assert {field.name for field in fields(RewardConfig)} == METHODS.keys() - {"environment"}
 
 
 @pytest.mark.parametrize("method", list(METHODS))

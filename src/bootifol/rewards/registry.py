@@ -1,10 +1,11 @@
 """The reward methods by name, and anyone's own as `MODULE:NAME` (docs/add_a_method.md).
 
-To add one to the library: a folder beside this file, a field and a line here.
+To add one to the library: a folder beside this file, a field of `RewardConfig` and an entry of METHODS.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from bootifol.errors import BootifolError
@@ -22,19 +23,10 @@ from bootifol.rewards.own import own_reward_model
 from bootifol.rewards.virl.config import VirlConfig
 from bootifol.rewards.virl.model import VirlRewardModel
 
-METHODS = {
-    "bootifol": "contrastive learning, bootstrapped on the agent's own failures (Djeafea Sonwa et al., 2022)",
-    "virl": "siamese recurrent networks, trained only while the agent acts (Berseth and Pal, 2019)",
-    "context_translation": "expert videos translated into the agent's first frame (Liu et al., 2018)",
-    "gaifo": "a discriminator on three successive frames (Torabi, Warnell and Stone, 2018)",
-    "environment": "the environment's own reward: an upper bound, not imitation",
-}
-"""Every method and what it is."""
-
 
 @dataclass(frozen=True)
 class RewardConfig:
-    """One section a method; only the chosen method's is read."""
+    """One section a method, of its name; only the chosen method's is read."""
 
     bootifol: BootifolConfig = field(default_factory=BootifolConfig)
     """BootIfOL's reward model."""
@@ -47,6 +39,40 @@ class RewardConfig:
 
     gaifo: GaifoConfig = field(default_factory=GaifoConfig)
     """GAIfO's discriminator."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A reward method of the library."""
+
+    description: str
+    """What it is, and whose."""
+
+    make: Callable[..., RewardModel]
+    """Its reward model, from (its section of `RewardConfig` or None, video_size, seed, device)."""
+
+
+METHODS = {
+    "bootifol": Method(
+        "contrastive learning, bootstrapped on the agent's own failures (Djeafea Sonwa et al., 2022)",
+        BootifolRewardModel,
+    ),
+    "virl": Method(
+        "siamese recurrent networks, trained only while the agent acts (Berseth and Pal, 2019)",
+        VirlRewardModel,
+    ),
+    "context_translation": Method(
+        "expert videos translated into the agent's first frame (Liu et al., 2018)",
+        ContextTranslationRewardModel,
+    ),
+    "gaifo": Method(
+        "a discriminator on three successive frames (Torabi, Warnell and Stone, 2018)", GaifoRewardModel
+    ),
+    "environment": Method(
+        "the environment's own reward: an upper bound, not imitation", lambda *_: EnvironmentRewardModel()
+    ),
+}
+"""Every method by name."""
 
 
 def check_method(method: str) -> None:
@@ -101,14 +127,6 @@ def make_reward_model(
         BootifolError: there is no such method, or it cannot read videos of that size.
     """
     check_method(method)
-    if method == "bootifol":
-        return BootifolRewardModel(config.bootifol, video_size, seed, device)
-    if method == "virl":
-        return VirlRewardModel(config.virl, video_size, seed, device)
-    if method == "context_translation":
-        return ContextTranslationRewardModel(config.context_translation, video_size, seed, device)
-    if method == "gaifo":
-        return GaifoRewardModel(config.gaifo, video_size, seed, device)
-    if method == "environment":
-        return EnvironmentRewardModel()
-    return own_reward_model(method, video_size, seed, device)
+    if method not in METHODS:
+        return own_reward_model(method, video_size, seed, device)
+    return METHODS[method].make(getattr(config, method, None), video_size, seed, device)
