@@ -30,10 +30,9 @@ from typing import Annotated
 import numpy as np
 import tyro
 from rich.console import Console
-from torch.utils.flop_counter import FlopCounterMode
 
 from benchmarks.command import command
-from benchmarks.engine import measured_rates
+from benchmarks.engine import measured_rates, operations_of
 from benchmarks.rows import markdown
 from bootifol.cli.train import preset_of
 from bootifol.demos.augmentation import augmented
@@ -202,10 +201,7 @@ def arithmetic_milliseconds(stage: Stage, rate: float) -> float | None:
     """Of its multiplications and additions at `rate` a second; None where there are none to count."""
     if not stage.computes:
         return None
-    with FlopCounterMode(display=False) as counter:
-        stage.work()
-    operations: int = counter.get_total_flops()
-    return 1e3 * operations / rate
+    return 1e3 * operations_of(stage.work) / rate
 
 
 def measure(
