@@ -123,9 +123,7 @@ def cloned(
     with progress(f"cloning: {variant}", arguments.updates) as advance:
         for done in range(arguments.updates):
             draw = replay.sample if moving_share is None else demonstrations.sample
-            learning_rate = demonstrations.config.cloning_learning_rate * one_cycle(
-                done, 0, arguments.updates
-            )
+            learning_rate = demonstrations.config.cloning_learning_rate * one_cycle(done, arguments.updates)
             batch = draw(config.agent.batch_size, rng)
             losses.append(float(agent.clone(batch, learning_rate)["agent/cloning_loss"]))
             advance(1, loss=losses[-1])

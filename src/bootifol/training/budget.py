@@ -24,12 +24,10 @@ class Counters:
     """Begun so far."""
     cloning_began_at: int = 0
     """Agent steps when the last Cloning Phase began."""
-    inverse_dynamics_updates: int = 0
-    """In all Cloning Phases."""
-    inferred_videos: int = 0
-    """Expert videos whose actions and rewards were inferred, in all Cloning Phases."""
-    cloning_updates: int = 0
-    """In all Cloning Phases."""
+    cloning_steps: int = 0
+    """In all Cloning Phases (`cloning.steps_of_a_phase`)."""
+    cloning_gradient_steps: int = 0
+    """Those of them that learn: of the inverse dynamics and of the clone."""
     alignment_seconds: float = 0.0
     """Wall-clock time spent in the Alignment Phase."""
     interactive_seconds: float = 0.0

@@ -61,14 +61,7 @@ def save_checkpoint(directory: Path, progress: Progress, components: Mapping[str
         BootifolError: it could not be written; earlier checkpoints are intact.
     """
     counters = progress.counters
-    other_steps = sum(
-        (
-            counters.alignment_steps,
-            counters.inverse_dynamics_updates,
-            counters.inferred_videos,
-            counters.cloning_updates,
-        )
-    )
+    other_steps = counters.alignment_steps + counters.cloning_steps
     target = directory / f"{counters.agent_steps:012d}-{other_steps:09d}"
     with written_aside(target) as aside:
         aside.mkdir()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,14 +17,6 @@ from bootifol.rewards.base import RewardModel
 from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.demonstrations import Demonstrations
 from bootifol.types import StepMetrics
-
-
-class CloningSteps(NamedTuple):
-    """Steps of a Cloning Phase, in this order."""
-
-    inverse_dynamics_updates: int
-    inferred_videos: int
-    cloning_updates: int
 
 
 def cloning_phase(
@@ -53,51 +44,50 @@ def cloning_phase(
     """
     watch = Stopwatch()
     config = demonstrations.config
+    inferring = config.inverse_dynamics_updates
+    cloning = inferring + len(demonstrations)
     if not cloning_in_progress(demonstrations, counters):
         counters.cloning_phases += 1
         counters.cloning_began_at = counters.agent_steps
-    first = _steps_until(demonstrations, counters.cloning_phases - 1)
-    end = _steps_until(demonstrations, counters.cloning_phases)
-    while not budget.ended(counters) and (done := _steps_done(counters)) != end:
+    earlier = (counters.cloning_phases - 1) * steps_of_a_phase(demonstrations)
+    while not budget.ended(counters) and cloning_in_progress(demonstrations, counters):
         metrics: StepMetrics = {}
-        if done.inverse_dynamics_updates < end.inverse_dynamics_updates:
-            rate = one_cycle(
-                done.inverse_dynamics_updates, first.inverse_dynamics_updates, end.inverse_dynamics_updates
-            )
-            metrics = demonstrations.learn_inverse_dynamics(
-                agent_replay,
-                counters.agent_steps - agent.config.warm_up_steps,
-                rng,
-                rate * config.inverse_dynamics_learning_rate,
-            )
-            counters.inverse_dynamics_updates += 1
-        elif done.inferred_videos < end.inferred_videos:
-            demonstrations.infer(done.inferred_videos - first.inferred_videos, reward_model, rng)
-            counters.inferred_videos += 1
+        if (step := counters.cloning_steps - earlier) < inferring:
+            rate = one_cycle(step, inferring) * config.inverse_dynamics_learning_rate
+            policy_steps = counters.agent_steps - agent.config.warm_up_steps
+            metrics = demonstrations.learn_inverse_dynamics(agent_replay, policy_steps, rng, rate)
+        elif step < cloning:
+            demonstrations.infer(step - inferring, reward_model, rng)
         else:
-            rate = one_cycle(done.cloning_updates, first.cloning_updates, end.cloning_updates)
-            batch = demonstrations.sample(agent.config.batch_size, rng)
-            metrics = agent.clone(batch, rate * config.cloning_learning_rate)
-            counters.cloning_updates += 1
+            rate = one_cycle(step - cloning, config.cloning_updates) * config.cloning_learning_rate
+            metrics = agent.clone(demonstrations.sample(agent.config.batch_size, rng), rate)
+        counters.cloning_steps += 1
+        counters.cloning_gradient_steps += bool(metrics)
         counters.cloning_seconds += watch.lap()
         yield metrics
 
 
-def one_cycle(done: int, first: int, end: int) -> float:
-    """What share of its highest value a learning rate has at gradient step `done` of those from `first` to `end`.
+def one_cycle(done: int, steps: int) -> float:
+    """What share of its highest value a learning rate has at gradient step `done` of `steps`.
 
     It rises for a twentieth of them and falls to 0 with half a cosine, so that the parameters come to rest.
     """
-    passed = (done - first + 1) / (end - first + 1)
+    passed = (done + 1) / (steps + 1)
     rise = 0.05
     if passed < rise:
         return passed / rise
     return 0.5 + 0.5 * math.cos(math.pi * (passed - rise) / (1 - rise))
 
 
+def steps_of_a_phase(demonstrations: Demonstrations) -> int:
+    """Gradient steps of the inverse dynamics, videos that they name the actions of, gradient steps of the clone."""
+    config = demonstrations.config
+    return config.inverse_dynamics_updates + len(demonstrations) + config.cloning_updates
+
+
 def cloning_in_progress(demonstrations: Demonstrations, counters: Counters) -> bool:
     """Whether a Cloning Phase was begun and has not ended."""
-    return _steps_done(counters) != _steps_until(demonstrations, counters.cloning_phases)
+    return counters.cloning_steps < counters.cloning_phases * steps_of_a_phase(demonstrations)
 
 
 def cloning_due(demonstrations: Demonstrations, counters: Counters, budget: Budget) -> bool:
@@ -109,25 +99,4 @@ def cloning_due(demonstrations: Demonstrations, counters: Counters, budget: Budg
         counters.cloning_phases < config.phases
         and counters.agent_steps - counters.cloning_began_at >= config.repeat_every
         and budget.seconds_left(counters) >= counters.cloning_seconds / counters.cloning_phases
-    )
-
-
-def cloning_extent(demonstrations: Demonstrations, counters: Counters) -> tuple[int, int]:
-    """Steps of the phase that is due: how many are done, and how many there are."""
-    phases = counters.cloning_phases + (not cloning_in_progress(demonstrations, counters))
-    before, until = (sum(_steps_until(demonstrations, count)) for count in (phases - 1, phases))
-    return sum(_steps_done(counters)) - before, until - before
-
-
-def _steps_done(counters: Counters) -> CloningSteps:
-    return CloningSteps(counters.inverse_dynamics_updates, counters.inferred_videos, counters.cloning_updates)
-
-
-def _steps_until(demonstrations: Demonstrations, cloning_phases: int) -> CloningSteps:
-    """Steps when so many phases have ended."""
-    config = demonstrations.config
-    return CloningSteps(
-        cloning_phases * config.inverse_dynamics_updates,
-        cloning_phases * len(demonstrations),
-        cloning_phases * config.cloning_updates,
     )

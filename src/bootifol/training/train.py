@@ -31,7 +31,7 @@ from bootifol.training.checkpoint import (
     restore_generator,
     save_checkpoint,
 )
-from bootifol.training.cloning import cloning_extent, cloning_phase
+from bootifol.training.cloning import cloning_phase, steps_of_a_phase
 from bootifol.training.components import build_components, build_environment, build_learners, open_demos
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.interruption import Interruption
@@ -175,7 +175,8 @@ class Run:
         averages = Averages()
         log_every = self.run.training.interactive.log_every
         shown: dict[str, float] = {}
-        done, total = cloning_extent(demonstrations, self.counters)
+        total = steps_of_a_phase(demonstrations)
+        done = self.counters.cloning_steps % total
         phase = cloning_phase(
             self.components.agent,
             demonstrations,
@@ -190,8 +191,7 @@ class Run:
                 averages.add(metrics)
                 done += 1
                 if (done % log_every == 0 or done == total) and (means := averages.pop()):
-                    gradient_steps = self.counters.inverse_dynamics_updates + self.counters.cloning_updates
-                    self._log("cloning", "gradient_step", gradient_steps, means)
+                    self._log("cloning", "gradient_step", self.counters.cloning_gradient_steps, means)
                     shown |= means
                 advance(1, **shown)
                 if interruption.requested:
