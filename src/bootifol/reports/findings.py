@@ -4,23 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import RankingScores, ranking_scores
-from bootifol.evaluation.tables import RankingRow
+from bootifol.evaluation.summary import Summary, summarize
+from bootifol.evaluation.tables import EvaluationRow, RankingRow
 from bootifol.reports.final_return import FinalReturn, final_return
-from bootifol.reports.run_files import CLONING, INTERACTIVE, Curve, RunFiles
+from bootifol.reports.names import hears_reward
+from bootifol.reports.run_files import CLONING, INTERACTIVE, RunFiles
 
 Verdict = Literal["good", "fair", "poor"]
+Direction = Literal["up", "down", "unclear"]
+Item = TypeVar("Item")
+
+FEWEST_EVALUATIONS = 8
+"""Of which a quarter is two: from one evaluation to the next a policy comes and goes."""
+
+FEWEST_STARTS = 5
+"""Of evaluation episodes at either end: a bootstrap interval of fewer is no interval."""
+
+FEWEST_REWARDS = 20
+"""Records of the learned reward; a quarter is five."""
 
 
 def number(value: float) -> str:
     """A value for reading: three digits that count, and a real minus sign."""
     text = f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
     return text.replace("-", "\N{MINUS SIGN}")
+
+
+def _percent(value: float) -> str:
+    return f"{value:.0%}".replace("-", "\N{MINUS SIGN}")
 
 
 @dataclass(frozen=True)
@@ -40,8 +57,8 @@ def scores_or_none(rows: Sequence[RankingRow]) -> RankingScores | None:
 
 
 def findings(run: RunFiles) -> list[Finding]:
-    """What the run learned: its policy, its reward, and whether the one followed the other."""
-    found = [_policy(run), _reward(run), _following(run), _showcase(run)]
+    """What the run learned: its policy, its reward, what cloning did, and whether return followed reward."""
+    found = [_policy(run), _reward(run), _cloning(run), _following(run), _showcase(run)]
     return [finding for finding in found if finding is not None]
 
 
@@ -61,7 +78,7 @@ def _policy(run: RunFiles) -> Finding | None:
     )
     text = (
         f"The policy returns {number(final.environment_return.mean)} in {final.episode_steps} agent steps{ends}: "
-        f"{value:.0%} of the way from random to expert{solved}."
+        f"{_percent(value)} of the way from random to expert{solved}."
     )
     return Finding(_verdict(value, good=0.8, fair=0.2), text)
 
@@ -106,48 +123,110 @@ def _reward(run: RunFiles) -> Finding | None:
     return Finding(_verdict(weakest, good=0.8, fair=0.6), text + ".")
 
 
-def _following(run: RunFiles) -> Finding | None:
-    """Did the agent's reward rise, and the true return with it?"""
-    reward = run.curve(INTERACTIVE, "episode/learned_reward")
-    lengths = run.episode_lengths()
-    if reward is None or len(reward) < 20 or not lengths:
+def _cloning(run: RunFiles) -> Finding | None:
+    """From where to where the first Cloning Phase took the true return, and where it was after the last."""
+    if CLONING not in run.phase_seconds or not run.episode_lengths():
         return None
-    returns = [
-        float(np.mean([row.environment_return for row in rows]))
-        for rows in run.evaluations_of(lengths[0]).values()
-    ]
-    if len(returns) < 4:
+    began, ended = run.phase_seconds[CLONING]
+    length = run.episode_lengths()[0]
+    evaluations = list(run.evaluations_of(length).values())
+    # A Cloning Phase ends with an evaluation, and has none within.
+    before = [rows for rows in evaluations if rows[0].seconds < began][-1:]
+    after = [rows for rows in evaluations if rows[0].seconds >= began][:1]
+    after_last = [rows for rows in evaluations if rows[0].seconds >= ended][:1]
+    change = _change_of_returns(before, after)
+    if change is None:
         return None
-    early, late, spread = _change(reward)
-    rises = late > early + spread
-    quarter = max(1, len(returns) // 4)
-    improves = np.mean(returns[-quarter:]) > np.mean(returns[:quarter]) + np.std(returns[:quarter])
     text = (
-        f"Per step of its episodes the agent earned a learned reward of {number(early)} at first "
-        f"and {number(late)} at last"
+        f"Cloning the videos took the true return in {length} agent steps from {number(change.first.mean)} to "
+        f"{number(change.last.mean)}"
     )
-    if rises and improves and any(phase == CLONING for phase, _ in run.curves):
+    if after_last and after_last != after:
+        mean = np.mean([row.environment_return for row in after_last[0]])
+        text += f"; after the last Cloning Phase it was {number(float(mean))}"
+    verdict: dict[Direction, Verdict] = {"up": "good", "unclear": "fair", "down": "poor"}
+    return Finding(verdict[change.direction], f"{text}.")
+
+
+def _following(run: RunFiles) -> Finding | None:
+    """Did the agent's reward rise, and the true return with it?
+
+    First and last quarter of what was measured are compared; where there was a Cloning Phase, of what was measured
+    after it, for the return jumps there without the reward's doing. The method that learns from the true return and
+    a policy that hears no reward have nothing to tell.
+    """
+    cloned = CLONING in run.phase_seconds
+    reward = run.curve(INTERACTIVE, "episode/learned_reward")
+    if reward is None or run.method == "environment" or not hears_reward(run):
+        return None
+    ended = run.phase_seconds[CLONING][1] if cloned else 0.0
+    length = run.episode_lengths()[0] if run.episode_lengths() else 0
+    evaluations = {
+        steps: rows for steps, rows in run.evaluations_of(length).items() if rows[0].seconds >= ended
+    }
+    rewards = reward.values[reward.steps > min(evaluations)] if cloned and evaluations else reward.values
+    if len(evaluations) < FEWEST_EVALUATIONS or len(rewards) < FEWEST_REWARDS:
+        return None
+    earned = Change(*(summarize(values) for values in _quarters(list(rewards))))
+    returned = _change_of_returns(*_quarters(list(evaluations.values())))
+    if returned is None:
+        return None
+    text = (
+        f"{'After the Cloning Phase' if cloned else 'In its training episodes'} the agent earned a learned reward of "
+        f"{number(earned.first.mean)} per step at first and {number(earned.last.mean)} at last"
+    )
+    ends = f"from {number(returned.first.mean)} to {number(returned.last.mean)} in {length} agent steps"
+    if cloned:
+        return _after_cloning(returned.direction, text, ends)
+    policy = _policy(run)
+    return _without_cloning(
+        earned.direction, returned.direction, text, ends, policy is None or policy.verdict == "poor"
+    )
+
+
+def _after_cloning(returned: Direction, text: str, ends: str) -> Finding:
+    if returned == "up":
         return Finding(
             "fair",
-            f"{text}, and its true return rose with it. The policy became a clone of the videos in between, so this "
-            "does not show that the reward leads to the task.",
+            f"{text}, and its true return rose {ends}. It goes on imitating the videos, so this does not show that "
+            "the reward leads to the task.",
         )
-    if rises and improves:
-        return Finding("good", f"{text}, and its true return rose with it: the reward leads to the task.")
-    if rises:
+    if returned == "down":
         return Finding(
-            "poor",
-            f"{text}, but its true return did not rise: it follows a reward that does not lead to the task.",
-        )
-    if improves:
-        return Finding(
-            "fair",
-            f"{text}: no clear rise although the true return rose. The encoder moves while the agent learns, "
-            "so rewards of different times are not on one scale.",
+            "poor", f"{text}, and its true return fell {ends}: what it learned then spoiled the clone."
         )
     return Finding(
-        "poor", f"{text}, and its true return did not rise either: it has not learned to earn the reward."
+        "fair",
+        f"{text}, and its true return went {ends}, no clear change: what it learned then neither clearly improved "
+        "nor clearly spoiled the clone.",
     )
+
+
+def _without_cloning(earned: Direction, returned: Direction, text: str, ends: str, poor: bool) -> Finding:
+    """`poor`: where the policy ended far from the task."""
+    if returned == "up" and earned == "up":
+        return Finding(
+            "good", f"{text}, and its true return rose with it {ends}: the reward leads to the task."
+        )
+    if returned == "up":
+        return Finding(
+            "fair",
+            f"{text}: no clear rise although the true return rose {ends}. The reward model changes while the agent "
+            "learns, so rewards of different times are not on one scale.",
+        )
+    if returned == "down" and earned == "up":
+        return Finding(
+            "poor",
+            f"{text}, but its true return fell {ends}: it follows a reward that leads away from the task.",
+        )
+    if returned == "down":
+        return Finding("poor", f"{text}, and its true return fell {ends}.")
+    unclear = f"its true return did not clearly rise ({ends})"
+    if not poor:
+        return Finding("fair", f"{text}, and {unclear}.")
+    if earned == "up":
+        return Finding("poor", f"{text}, but {unclear}: it follows a reward that does not lead to the task.")
+    return Finding("poor", f"{text}, and {unclear} either: it has not learned to earn the reward.")
 
 
 def _showcase(run: RunFiles) -> Finding | None:
@@ -168,11 +247,47 @@ def _showcase(run: RunFiles) -> Finding | None:
     return Finding(_verdict(position, good=0.7, fair=0.2), f"{text}.")
 
 
-def _change(curve: Curve) -> tuple[float, float, float]:
-    """Mean of the first and of the last tenth, and the standard deviation within the first."""
-    tenth = max(1, len(curve) // 10)
-    first, last = curve.values[:tenth], curve.values[-tenth:]
-    return float(first.mean()), float(last.mean()), float(first.std())
+@dataclass(frozen=True)
+class Change:
+    """What was measured at first and at last."""
+
+    first: Summary
+    last: Summary
+
+    @property
+    def direction(self) -> Direction:
+        """Up or down only where the two intervals lie apart."""
+        if self.first.interval is None or self.last.interval is None:
+            return "unclear"
+        if self.last.interval[0] > self.first.interval[1]:
+            return "up"
+        return "down" if self.last.interval[1] < self.first.interval[0] else "unclear"
+
+
+def _change_of_returns(
+    first: Sequence[Sequence[EvaluationRow]], last: Sequence[Sequence[EvaluationRow]]
+) -> Change | None:
+    """Between evaluations; None where either end has too few starts to tell.
+
+    A start that was evaluated several times counts once, with the mean of its returns: the same few starts played again
+    and again do not make the mean of all starts surer.
+    """
+    ends = []
+    for evaluations in (first, last):
+        by_start: dict[int, list[float]] = {}
+        for rows in evaluations:
+            for row in rows:
+                by_start.setdefault(row.seed, []).append(row.environment_return)
+        if len(by_start) < FEWEST_STARTS:
+            return None
+        ends.append(summarize([np.mean(returns) for returns in by_start.values()]))
+    return Change(*ends)
+
+
+def _quarters(values: Sequence[Item]) -> tuple[Sequence[Item], Sequence[Item]]:
+    """The first and the last quarter."""
+    quarter = len(values) // 4
+    return values[:quarter], values[-quarter:]
 
 
 def _verdict(value: float, good: float, fair: float) -> Verdict:

@@ -28,10 +28,16 @@ def task_title(task: str) -> str:
     return short_name(task) if ":" in task else task.replace("_", " ").title()
 
 
+def hears_reward(run: RunFiles) -> bool:
+    """Whether the reward has a say in what the policy becomes."""
+    weight = dict(flattened(run.config)).get("agent.cloning_weight", 0.0)
+    return float(weight) < CLONING_ALONE
+
+
 def agent_name(run: RunFiles) -> str:
     """The paper's name of what a run trained, such as `CT (n=10)`; any other method's own name."""
     config = dict(flattened(run.config))
-    if float(config.get("agent.cloning_weight", 0.0)) >= CLONING_ALONE:
+    if not hears_reward(run):
         return "Cloning alone"
     name = METHOD_NAMES.get(run.method, run.method)
     if run.method == "context_translation":

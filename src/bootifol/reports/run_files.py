@@ -83,6 +83,9 @@ class RunFiles:
     curves: Mapping[tuple[str, str], Curve]
     """Metrics by phase and name."""
 
+    phase_seconds: Mapping[str, tuple[float, float]]
+    """Wall-clock seconds of training at the first and at the last record of each phase that tells them."""
+
     seconds: float | None
     """Wall-clock seconds of training, by the last record that tells them."""
 
@@ -210,12 +213,12 @@ def read_run(run_dir: Path) -> RunFiles:
             f"{config_path} does not describe a run: it names no task; give the directory that `train` wrote"
         )
     notes: list[str] = []
-    curves, metric_seconds = _read_metrics(run_dir / "metrics.jsonl", notes)
+    curves, phase_seconds = _read_metrics(run_dir / "metrics.jsonl", notes)
     evaluations = _read_table(run_dir / "evaluations.csv", read_evaluations, "evaluations", notes)
     ranking = _read_table(run_dir / "ranking.csv", read_ranking, "ranking of held-out videos", notes)
     showcase = _read_showcase(run_dir / "showcase.safetensors", notes)
     video_files = _find_videos(run_dir / "videos", notes)
-    seconds = [*metric_seconds, *(row.seconds for row in evaluations)]
+    seconds = [*(last for _, last in phase_seconds.values()), *(row.seconds for row in evaluations)]
     seed, time_budget = header.get("seed"), header.get("time_budget")
     return RunFiles(
         path=run_dir,
@@ -234,6 +237,7 @@ def read_run(run_dir: Path) -> RunFiles:
             if isinstance(v, dict)
         },
         curves=curves,
+        phase_seconds=phase_seconds,
         seconds=max(seconds) if seconds else None,
         evaluations=evaluations,
         ranking=ranking,
@@ -285,15 +289,17 @@ def _versions(header: Mapping[str, Any], notes: list[str]) -> dict[str, str]:
     return found
 
 
-def _read_metrics(path: Path, notes: list[str]) -> tuple[dict[tuple[str, str], Curve], list[float]]:
-    """Curves by phase and name, and the seconds that were told (the latest of each phase)."""
+def _read_metrics(
+    path: Path, notes: list[str]
+) -> tuple[dict[tuple[str, str], Curve], dict[str, tuple[float, float]]]:
+    """Curves by phase and name, and the first and last seconds of each phase."""
     try:
         lines = path.read_text(errors="replace").splitlines()
     except OSError:
         notes.append("metrics.jsonl is missing: no losses and no learned reward over time.")
-        return {}, []
+        return {}, {}
     points: dict[tuple[str, str], tuple[list[float], list[float]]] = {}
-    seconds: dict[str, float] = {}
+    seconds: dict[str, tuple[float, float]] = {}
     damaged = dropped = 0
     for line in lines:
         record = _parse_record(line)
@@ -304,7 +310,8 @@ def _read_metrics(path: Path, notes: list[str]) -> tuple[dict[tuple[str, str], C
         counter = COUNTERS[phase]
         for name, value in record.items():
             if name == "seconds" and _is_finite(value):
-                seconds[phase] = max(seconds.get(phase, 0.0), float(value))
+                first, last = seconds.get(phase, (float(value), float(value)))
+                seconds[phase] = min(first, float(value)), max(last, float(value))
             elif name not in ("phase", counter, "seconds") and isinstance(value, int | float | None):
                 if value is not None and _is_finite(value):
                     steps, values = points.setdefault((phase, name), ([], []))
@@ -324,7 +331,7 @@ def _read_metrics(path: Path, notes: list[str]) -> tuple[dict[tuple[str, str], C
     for key, (steps, values) in points.items():
         order = np.argsort(steps, kind="stable")
         curves[key] = Curve(np.array(steps)[order], np.array(values)[order])
-    return curves, list(seconds.values())
+    return curves, seconds
 
 
 def _parse_record(line: str) -> dict[str, Any] | None:
