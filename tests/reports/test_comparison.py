@@ -72,8 +72,8 @@ def test_a_copy_counts_once(tmp_path: Path) -> None:
     write_run(tmp_path / "results" / "b", returns=(1.0, 2.0))
     comparison = comparison_of(tmp_path)
     assert [len(group.runs) for group in comparison.groups] == [1]
-    assert any("runs/a is left out: it is a copy of" in note for note in comparison.notes)
-    assert any("left out: it has the seed and the configuration of" in note for note in comparison.notes)
+    assert any("runs/a is a copy of" in note for note in comparison.notes)
+    assert any("has the seed and the configuration of" in note for note in comparison.notes)
 
 
 def test_runs_of_mixed_configurations_are_kept_apart_and_named(tmp_path: Path) -> None:
@@ -240,5 +240,11 @@ def test_a_path_that_leads_to_no_run_is_refused(tmp_path: Path) -> None:
         find_runs([tmp_path / "typo"])
     with pytest.raises(BootifolError, match="there is no run in"):
         find_runs([tmp_path])
+    inside = write_run(tmp_path / "run") / "checkpoints"
+    inside.mkdir()
+    with pytest.raises(
+        BootifolError, match="checkpoints, which lies inside one; give the run's own directory"
+    ):
+        find_runs([inside])
     with pytest.raises(BootifolError, match="there is no run; name the directory"):
         find_runs([])

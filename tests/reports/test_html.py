@@ -4,6 +4,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from made_up_runs import write_run
 from synthetic_run import write_synthetic_run
 
 from bootifol.cli.report import report as report_command
@@ -110,6 +111,50 @@ def test_several_runs_are_compared(shared_run: Path, tmp_path: Path) -> None:
     compared = [svg for svg in svgs(page) if "bootifol, seed 1" in svg and "environment, seed 1" in svg]
     assert len(compared) == 10  # four curves and six losses
     assert [url for tag, url in page.loaded if tag == "a"] == ["#run-0", "#run-1"]
+    assert "Before you compare" in page.text and "older than the record of the library's code" in page.text
+
+
+def test_what_keeps_runs_from_being_compared_is_said(tmp_path: Path) -> None:
+    """The sentences that stand below a table."""
+    write_run(tmp_path / "bootifol" / "seed1", time_budget=60.0)
+    write_run(tmp_path / "virl" / "seed1", method="virl", time_budget=600.0)
+    page = Page(report([tmp_path], tmp_path / "report.html"))
+    assert "Budgets on Reacher Hard are unequal (BootIfOL: 1 min 00 s; ViRL: 10 min 00 s)" in page.text
+    unfinished = "it has trained for 1 min 00 s of 10 min 00 s"
+    assert f"(ViRL on Reacher Hard) is unfinished and counts as far as it has come: {unfinished}" in page.text
+    # Both directories are called seed1.
+    assert "bootifol/seed1" in page.text and "virl/seed1" in page.text
+
+
+def test_returns_of_different_tasks_are_drawn_together_only_where_they_are_scaled(tmp_path: Path) -> None:
+    curve = {500: [10.0, 20.0], 1000: [30.0, 40.0]}
+    first = write_run(tmp_path / "first", curve=curve)
+    second = write_run(tmp_path / "second", task="hopper_stand", agent_steps=600, curve=curve)
+    page = Page(report([first, second], tmp_path / "report.html"))
+    together = [svg for svg in svgs(page) if "first" in svg and "second" in svg]
+    assert [("scaled return" in svg, "-step episodes" in svg) for svg in together] == [(True, False)] * 2
+    assert (
+        "Only scaled returns are drawn together, for these runs share no other measure (Reacher Hard in 60 and 500 "
+        "agent steps; Hopper Stand in 60 and 500 agent steps)." in page.text
+    )
+    assert "second (BootIfOL on Hopper Stand) is unfinished" in page.text
+    assert "hopper_stand" in page.text.split("The runs compared")[0]
+
+
+def test_returns_of_one_task_have_the_levels_of_its_expert(tmp_path: Path) -> None:
+    runs = [write_run(tmp_path / name, seed=seed) for seed, name in enumerate(("first", "second"))]
+    page = Page(report(runs, tmp_path / "report.html"))
+    raw = [svg for svg in svgs(page) if "bootifol, seed 1" in svg and "return of 500-step episodes" in svg]
+    assert len(raw) == 1
+    assert "expert" in raw[0] and "random" in raw[0]
+    assert "Only scaled returns" not in page.text
+
+
+def test_a_run_is_reported_once(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "runs" / "one")
+    page = Page(report([run, tmp_path / "runs", run], tmp_path / "report.html"))
+    assert "side by side" not in page.text
+    assert page.text.count("How to get it again") == 1
 
 
 def test_a_run_with_nothing_but_its_configuration_has_a_report(bare_run: Path, tmp_path: Path) -> None:
@@ -138,7 +183,7 @@ def test_no_run_is_a_sentence_and_leaves_the_old_report(tmp_path: Path) -> None:
     out.write_text("old")
     with pytest.raises(BootifolError, match="name the directory"):
         report([], out)
-    with pytest.raises(BootifolError, match="there is no run directory"):
+    with pytest.raises(BootifolError, match="there is no directory"):
         report([tmp_path / "nowhere"], out)
     assert out.read_text() == "old"
 

@@ -37,6 +37,29 @@ def test_variants_of_one_method_and_seed_are_told_apart_by_directory(run: RunFil
     assert second.label == "soft-minimum"
 
 
+def test_directories_are_named_by_as_much_as_tells_them_apart(run: RunFiles) -> None:
+    paths = [Path("runs/gaifo/seed1"), Path("runs/virl/seed1")]
+    assert [look.label for look in plots.looks_of([replace(run, path=path) for path in paths])] == [
+        "gaifo/seed1",
+        "virl/seed1",
+    ]
+
+
+def test_unscaled_returns_are_of_the_shortest_episodes_that_all_runs_have(run: RunFiles) -> None:
+    final_alone = [row for row in run.evaluations if row.episode_steps == 500]
+    figure = plots.return_curves(
+        plots.looks_of([run, replace(run, seed=2, evaluations=final_alone)]), scaled=False
+    )
+    assert figure is not None
+    axes = figure.axes[0]
+    assert axes.get_ylabel() == "return of 500-step episodes"
+    first, second = (np.asarray(line.get_xydata())[-1] for line in axes.lines[:2])
+    assert list(first) == list(second)
+    other_task = [replace(run, task="hopper_stand"), run]
+    assert plots.return_curves(plots.looks_of(other_task), scaled=False) is None
+    assert plots.return_curves(plots.looks_of(other_task), scaled=True) is not None
+
+
 def test_more_runs_than_colors_still_differ(run: RunFiles) -> None:
     looks = plots.looks_of([replace(run, path=Path(f"runs/{i}")) for i in range(10)])
     assert len({(look.color, str(look.dashes)) for look in looks}) == 10

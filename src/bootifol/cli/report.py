@@ -11,8 +11,8 @@ def report(runs: RunPaths, out: Path | None = None) -> int:
     """Write what one run learned, or several side by side, as one HTML file that opens in any browser.
 
     Args:
-        runs: Directories that `bootifol train` wrote; a run in progress will do.
-        out: The file to write; by default report.html in the run's directory, or here for several runs.
+        runs: Directories that `bootifol train` wrote, or directories that hold some; a run in progress will do.
+        out: The file to write; by default report.html in the one directory that was given, or here for several.
     """
     # Imported here: matplotlib would slow down every other command's help.
     from bootifol.reports.html import report as write_report

@@ -174,8 +174,8 @@ def _groups(runs: Sequence[RunFiles], agent: Callable[[RunFiles], str], notes: l
         if run.seed in seeds:
             same = seeds[run.seed].evaluations == run.evaluations
             notes.append(
-                f"{run.path} is left out: it {'is a copy' if same else 'has the seed and the configuration'} of "
-                f"{seeds[run.seed].path}."
+                f"{run.path} {'is a copy' if same else 'has the seed and the configuration'} of "
+                f"{seeds[run.seed].path}, and does not count in an average."
             )
         else:
             seeds[run.seed] = run

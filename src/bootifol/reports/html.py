@@ -11,16 +11,16 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from bootifol.errors import BootifolError
 from bootifol.evaluation.summary import Summary
 from bootifol.files import written_aside
 from bootifol.reports import plots
+from bootifol.reports.comparison import compare
 from bootifol.reports.film_strip import KINDS, reward_above_film_strip, videos_of_start
 from bootifol.reports.final_return import FinalReturn, final_return
 from bootifol.reports.findings import Finding, findings, number, scores_or_none
 from bootifol.reports.names import task_title
-from bootifol.reports.plots import RunLook, looks_of
-from bootifol.reports.run_files import COUNTERS, RunFiles, flattened, read_run
+from bootifol.reports.plots import RunLook, common_length, looks_of
+from bootifol.reports.run_files import COUNTERS, RunFiles, find_runs, flattened, read_run
 from bootifol.reports.style import KIND_COLORS, svg_data_uri, thousands
 from bootifol.types import AnyPath
 
@@ -66,6 +66,7 @@ class RunSection:
 
     run: RunFiles
     anchor: str
+    name: str
     color: str
     tiles: Sequence[Tile]
     findings: Sequence[Finding]
@@ -154,22 +155,22 @@ def report(run_dirs: Sequence[AnyPath], out: AnyPath) -> Path:
     """Writes the report of one run, or of several side by side, and returns its path.
 
     Args:
-        run_dirs: directories that `train` wrote, of finished runs or runs in progress.
+        run_dirs: directories that `train` wrote, of finished runs or runs in progress, or directories that hold some.
         out: the HTML file.
 
     Raises:
         BootifolError: there is no run, or a directory is not one.
     """
-    if not run_dirs:
-        raise BootifolError("there is no run to report on; name the directory of one at least")
     directories, target = [Path(run_dir) for run_dir in run_dirs], Path(out)
-    runs = [read_run(directory) for directory in directories]
+    runs = [read_run(run_dir) for run_dir in find_runs(directories)]
     looks = looks_of(runs)
     page = _template_environment().get_template("page.html")
     html = page.render(
         title=_title(runs),
         sections=[_section(look, f"run-{number}", alone=len(runs) == 1) for number, look in enumerate(looks)],
         comparison=_curve_cards(looks) + _loss_cards(looks) if len(runs) > 1 else [],
+        warnings=_warnings(looks) if len(runs) > 1 else [],
+        several_tasks=len({run.task for run in runs}) > 1,
         report_command=shlex.join(["bootifol", "report", *map(str, directories), "--out", str(target)]),
         kind_colors=KIND_COLORS,
     )
@@ -192,12 +193,31 @@ def _title(runs: Sequence[RunFiles]) -> str:
     return ", ".join(dict.fromkeys(task_title(run.task) for run in runs))
 
 
+def _warnings(looks: Sequence[RunLook]) -> list[str]:
+    """What to know before numbers of several runs are compared."""
+    runs = [look.run for look in looks]
+    notes = list(compare(runs, unfinished=True).notes)
+    if common_length(looks) is None:
+        lengths = [" and ".join(map(str, run.episode_lengths())) for run in runs]
+        played = [
+            f"{task_title(run.task)} in {length} agent steps"
+            for run, length in zip(runs, lengths, strict=True)
+            if length
+        ]
+        told = "; ".join(dict.fromkeys(played)) or "no evaluations yet"
+        notes.insert(
+            0, f"Only scaled returns are drawn together, for these runs share no other measure ({told})."
+        )
+    return notes
+
+
 def _section(look: RunLook, anchor: str, alone: bool) -> RunSection:
     run = look.run
     single = looks_of([run])
     return RunSection(
         run=run,
         anchor=anchor,
+        name=look.name,
         color=look.color,
         tiles=_tiles(run),
         findings=findings(run),
@@ -263,8 +283,9 @@ def _curve_cards(looks: Sequence[RunLook]) -> list[Card]:
         *_card(
             "Learned reward",
             plots.learned_reward_curves(looks),
-            "What the agent earned per step of its training episodes. Healthy: rises together with the return; rising "
-            "alone, it is being tricked.",
+            "What the agent earned per step of its training episodes"
+            + ("" if alone else ", on a scale of each run's own")
+            + ". Healthy: rises together with the return; rising alone, it is being tricked.",
         ),
     ]
 

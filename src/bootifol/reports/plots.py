@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,9 @@ class RunLook:
     """How one run is drawn wherever runs are compared."""
 
     run: RunFiles
+    name: str
+    """Its directory, with as much of the path as tells it from the others."""
+
     label: str
     color: str
     dashes: Any
@@ -41,26 +45,47 @@ class RunLook:
 def looks_of(runs: Sequence[RunFiles]) -> list[RunLook]:
     """Gives every run its look: color by method and dashes by seed; a single run has the agent's color.
 
-    Where method and seed do not tell runs apart (variants of one method), each has its own color and the name of
-    its directory.
+    Where method and seed do not tell runs apart (variants of one method, or tasks), each has its own color and the
+    name of its directory.
     """
+    names = _names([run.path for run in runs])
     distinct = len({run.label for run in runs}) == len(runs)
     groups = [run.method if distinct else str(run.path) for run in runs]
     order = list(dict.fromkeys(groups))
     looks = []
-    for number, (run, group) in enumerate(zip(runs, groups, strict=True)):
+    for number, (run, name, group) in enumerate(zip(runs, names, groups, strict=True)):
         color = order.index(group)
         # Dashes tell apart the runs of one group, and the groups that share a color when colors run out.
         dashes = groups[:number].count(group) + color // len(RUN_COLORS)
         looks.append(
             RunLook(
                 run=run,
-                label=run.label if distinct else run.path.name,
+                name=name,
+                label=run.label if distinct else name,
                 color=RUN_COLORS[color % len(RUN_COLORS)],
                 dashes=RUN_DASHES[dashes % len(RUN_DASHES)],
             )
         )
     return looks
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """The last parts of paths, as many as tell them apart."""
+    for count in range(1, max(len(path.parts) for path in paths) + 1):
+        names = ["/".join(path.parts[-count:]) for path in paths]
+        if len(set(names)) == len(names):
+            return names
+    return [str(path) for path in paths]
+
+
+def common_length(looks: Sequence[RunLook]) -> int | None:
+    """Agent steps of the shortest episodes that all runs were evaluated on, whose returns may stand on one axis.
+
+    None where there are none, or the runs are of several tasks.
+    """
+    evaluated = [set(look.run.episode_lengths()) for look in looks if look.run.evaluations]
+    shared = set.intersection(*evaluated) if evaluated else set()
+    return min(shared) if shared and len({look.run.task for look in looks}) == 1 else None
 
 
 def return_curves(looks: Sequence[RunLook], scaled: bool, by_time: bool = False) -> Figure | None:
@@ -76,20 +101,23 @@ def return_curves(looks: Sequence[RunLook], scaled: bool, by_time: bool = False)
 def draw_return_curves(axes: Axes, looks: Sequence[RunLook], scaled: bool, by_time: bool = False) -> bool:
     """Draws mean and bootstrap interval of each evaluation; False where there is nothing to draw.
 
-    The curve is of the shortest episodes (those evaluated along the way). Where the return is scaled, so that
-    both share one axis, a diamond marks the evaluation on longer ones.
+    The curve is of the shortest episodes: of those that have a scale, or of those that all runs were evaluated on.
+    Unscaled returns of several tasks are not drawn. Where the return is scaled, so that both share one axis, a diamond
+    marks the evaluation on longer ones.
     """
+    common = None if scaled else common_length(looks)
     drawn = False
     levels: tuple[float, float] | None = (0.0, 1.0) if scaled else None
     for look in looks:
-        lengths = look.run.episode_lengths(scaled)
-        if not lengths:
+        lengths = look.run.episode_lengths(scaled=True)
+        length = (lengths[0] if lengths else None) if scaled else common
+        if length is None:
             continue
-        curve = _evaluation_curve(look.run.evaluations_of(lengths[0]), scaled, by_time)
+        curve = _evaluation_curve(look.run.evaluations_of(length), scaled, by_time)
         if not curve:
             continue
         drawn = True
-        levels = levels or look.run.return_levels(lengths[0])
+        levels = levels or look.run.return_levels(length)
         when = np.array([point.when for point in curve])
         mean = np.array([point.mean for point in curve])
         axes.fill_between(
@@ -105,14 +133,14 @@ def draw_return_curves(axes: Axes, looks: Sequence[RunLook], scaled: bool, by_ti
             when, mean, color=look.color, linestyle=look.dashes, marker=marker, markersize=3, label=look.label
         )
         if len(looks) == 1:
-            _scatter_episodes(axes, look, lengths[0], scaled, by_time)
+            _scatter_episodes(axes, look, length, scaled, by_time)
         if scaled and len(lengths) > 1:
             _draw_long_evaluations(axes, look, lengths[-1], by_time, alone=len(looks) == 1)
     if not drawn:
         return False
     if levels is not None:
         draw_levels(axes, *levels)
-    axes.set_ylabel("scaled return" if scaled else "return of an episode")
+    axes.set_ylabel("scaled return" if scaled else f"return of {common}-step episodes")
     if by_time:
         step_axis(axes, "minutes of wall-clock time")
     else:

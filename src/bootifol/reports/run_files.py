@@ -183,6 +183,10 @@ def find_runs(paths: Sequence[Path]) -> list[Path]:
             )
         for run_dir in below:
             found.setdefault(run_dir.resolve(), run_dir)
+    if not found:
+        raise BootifolError(
+            f"there is no run in {paths[0]}, which lies inside one; give the run's own directory"
+        )
     return list(found.values())
 
 
