@@ -66,11 +66,15 @@ def test_more_runs_than_colors_still_differ(run: RunFiles) -> None:
 
 
 def test_a_curve_shows_the_mean_of_the_episodes(run: RunFiles) -> None:
-    figure = plots.return_curves(plots.looks_of([run]), scaled=True)
-    assert figure is not None
-    drawn = np.asarray(figure.axes[0].lines[0].get_xydata())
-    steps, rows = list(run.evaluations_of(60).items())[7]
-    assert drawn[7] == pytest.approx((steps, np.mean([row.scaled_return for row in rows])))
+    """Of those that have a scale, and of the shortest, which have none."""
+    looks = plots.looks_of([run])
+    for scaled, length in ((True, 500), (False, 60)):
+        figure = plots.return_curves(looks, scaled)
+        assert figure is not None
+        drawn = np.asarray(figure.axes[0].lines[0].get_xydata())
+        steps, rows = list(run.evaluations_of(length).items())[7]
+        returns = [row.scaled_return if scaled else row.environment_return for row in rows]
+        assert drawn[7] == pytest.approx((steps, np.mean(returns)))
 
 
 def test_nothing_to_draw_gives_no_figure(run: RunFiles) -> None:

@@ -101,9 +101,8 @@ def return_curves(looks: Sequence[RunLook], scaled: bool, by_time: bool = False)
 def draw_return_curves(axes: Axes, looks: Sequence[RunLook], scaled: bool, by_time: bool = False) -> bool:
     """Draws mean and bootstrap interval of each evaluation; False where there is nothing to draw.
 
-    The curve is of the shortest episodes: of those that have a scale, or of those that all runs were evaluated on.
-    Unscaled returns of several tasks are not drawn. Where the return is scaled, so that both share one axis, a diamond
-    marks the evaluation on longer ones.
+    The episodes are those that have a scale, or the shortest that all runs were evaluated on; unscaled returns of
+    several tasks are not drawn.
     """
     common = None if scaled else common_length(looks)
     drawn = False
@@ -134,8 +133,6 @@ def draw_return_curves(axes: Axes, looks: Sequence[RunLook], scaled: bool, by_ti
         )
         if len(looks) == 1:
             _scatter_episodes(axes, look, length, scaled, by_time)
-        if scaled and len(lengths) > 1:
-            _draw_long_evaluations(axes, look, lengths[-1], by_time, alone=len(looks) == 1)
     if not drawn:
         return False
     if levels is not None:
@@ -233,33 +230,6 @@ def _scatter_episodes(axes: Axes, look: RunLook, episode_steps: int, scaled: boo
     ]
     when, values = zip(*points, strict=True)
     axes.scatter(when, values, s=7, color=look.color, alpha=0.22, linewidth=0)
-
-
-def _draw_long_evaluations(axes: Axes, look: RunLook, episode_steps: int, by_time: bool, alone: bool) -> None:
-    for point in _evaluation_curve(look.run.evaluations_of(episode_steps), True, by_time):
-        axes.errorbar(
-            point.when,
-            point.mean,
-            yerr=[[point.mean - point.low], [point.high - point.mean]],
-            color=look.color,
-            marker="D",
-            markersize=6,
-            markeredgecolor="white",
-            elinewidth=1.2,
-            zorder=5,
-            clip_on=False,
-        )
-        if alone:
-            axes.annotate(
-                f"{episode_steps}-step\nepisodes",
-                (point.when, point.mean),
-                xytext=(-9, -22),
-                textcoords="offset points",
-                ha="right",
-                va="top",
-                fontsize=8,
-                color=look.color,
-            )
 
 
 def draw_levels(axes: Axes, random: float, expert: float) -> None:
