@@ -6,6 +6,7 @@ import pytest
 from made_up_runs import write_run
 from matplotlib.axes import Axes
 from PIL import Image
+from synthetic_run import AGENT_STEPS
 
 from benchmarks import (
     figure_alignment,
@@ -15,6 +16,7 @@ from benchmarks import (
     figure_encoding_based,
     figure_metrics,
     figure_returns,
+    figure_run,
     figure_sequence_loss,
     table_dm_control,
     table_meta_world,
@@ -23,7 +25,7 @@ from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow, append_evaluations
 from bootifol.reports.comparison import Comparison, compare
 from bootifol.reports.figures import Loss, losses_figure, over_seeds, returns_figure
-from bootifol.reports.film_strip import expert_above_agent
+from bootifol.reports.film_strip import expert_above_agent, run_figure
 from bootifol.reports.run_files import Curve, find_runs, read_run
 
 CURVE = {100: [10.0, 20.0], 200: [30.0, 50.0]}
@@ -227,6 +229,26 @@ def test_film_strips_begin_at_the_start_and_end_at_the_end(shared_run: Path) -> 
     assert [text.get_text() for text in figure.axes[1].get_xticklabels()][:2] == ["0", "7"]
     tops = [axes.get_position().y1 for axes in figure.axes]
     assert tops == sorted(tops, reverse=True)
+
+
+def test_a_run_on_a_page(shared_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = read_run(shared_run)
+    curve, rewards, *strips = run_figure(run, start=1).axes
+    scaled = [row.scaled_return for row in run.evaluations_of(500)[AGENT_STEPS]]
+    assert np.asarray(curve.lines[0].get_ydata())[-1] == pytest.approx(np.mean(scaled))
+    for axes, line, kind in zip(strips, rewards.lines, ("expert", "agent", "random"), strict=True):
+        video = run.showcase[kind, 1]
+        np.testing.assert_array_equal(np.asarray(axes.images[0].get_array()), video.frames[3])
+        np.testing.assert_array_equal(np.asarray(line.get_ydata()), video.rewards)
+    out = tmp_path / "docs" / "run.png"
+    assert figure_run.main([str(shared_run), "--out", str(out)]) == 0
+    with Image.open(out) as picture:
+        assert picture.width == 1560
+    two = [str(shared_run), str(write_run(tmp_path / "a")), "--out", str(out)]
+    assert figure_run.main(two) == 2
+    assert "the figure shows one run, and there are 2" in capsys.readouterr().err
+    assert figure_run.main(two[1:]) == 2
+    assert "a has no films from start 0 to draw" in capsys.readouterr().err
 
 
 def test_a_run_without_films_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

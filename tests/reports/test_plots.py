@@ -3,14 +3,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
-from bootifol.errors import BootifolError
 from bootifol.reports import plots
 from bootifol.reports.film_strip import (
     reward_above_film_strip,
     rewards_above_film_strips,
-    save_readme_picture,
     videos_of_start,
 )
 from bootifol.reports.run_files import Curve, RunFiles, read_run
@@ -152,20 +149,6 @@ def test_the_same_figure_gives_the_same_bytes(run: RunFiles) -> None:
     assert first is not None
     assert second is not None
     assert svg_data_uri(first) == svg_data_uri(second)
-
-
-def test_the_picture_for_the_readme(shared_run: Path, tmp_path: Path) -> None:
-    save_readme_picture(shared_run, tmp_path / "docs" / "result.png")
-    with Image.open(tmp_path / "docs" / "result.png") as picture:
-        assert picture.width == 1560
-        colors = picture.convert("RGB").getcolors(maxcolors=1 << 22)
-    assert len(colors) > 100
-
-
-def test_a_run_without_showcase_has_no_picture(run_dir: Path, tmp_path: Path) -> None:
-    (run_dir / "showcase.safetensors").unlink()
-    with pytest.raises(BootifolError, match="has no showcase"):
-        save_readme_picture(run_dir, tmp_path / "result.png")
 
 
 @pytest.mark.parametrize(("value", "text"), [(950, "950"), (12_000, "12K"), (1_550_000, "1.55M"), (0, "0")])

@@ -17,9 +17,8 @@ class Summary:
 
     count: int
     mean: float
-    median: float
     interquartile_mean: float
-    """Mean of the middle half: less noisy than the median, less swayed by one lucky episode than the mean."""
+    """Mean of the middle half: less noisy than a median, less swayed by one lucky episode than the mean."""
 
     interval: tuple[float, float] | None
     """Bootstrap interval of the mean; None for a single number, which says nothing about spread."""
@@ -29,7 +28,7 @@ class Summary:
 
 
 def summarize(values: ArrayLike, confidence: float = 0.95, resamples: int = 5000, seed: int = 0) -> Summary:
-    """Mean, median, interquartile mean, and percentile bootstrap intervals of both means.
+    """Mean, interquartile mean, and percentile bootstrap intervals of both means.
 
     The same values give the same interval: the resampling has its own generator, from `seed`.
 
@@ -47,7 +46,6 @@ def summarize(values: ArrayLike, confidence: float = 0.95, resamples: int = 5000
     return Summary(
         count=len(sample),
         mean=float(sample.mean()),
-        median=float(np.median(sample)),
         interquartile_mean=float(stats.trim_mean(sample, 0.25)),
         interval=interval,
         interquartile_interval=interquartile_interval,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from bootifol.errors import BootifolError
-from bootifol.files import written_aside
 from bootifol.reports.names import agent_name, task_title
 from bootifol.reports.plots import draw_return_curves, looks_of
-from bootifol.reports.run_files import RunFiles, ShowcaseVideo, read_run
+from bootifol.reports.run_files import RunFiles, ShowcaseVideo
 from bootifol.reports.style import FAINT, KIND_COLORS, KIND_NAMES, RUN_COLORS, house_style
 from bootifol.types import Rewards, Video
 
@@ -170,20 +168,16 @@ def draw_reward_and_strips(
     return curves
 
 
-def save_readme_picture(run_dir: Path, out_png: Path) -> None:
-    """One PNG of a run for a README: learning curve, reward along videos, and their film strips.
+def run_figure(run: RunFiles, start: int = 0) -> Figure:
+    """One run on a page: its learning curve, the reward along videos from one start, and their film strips.
 
     Raises:
-        BootifolError: the run has no evaluations or no showcase yet.
+        BootifolError: the run has no scaled evaluations, or no such start in its showcase.
     """
-    run = read_run(run_dir)
-    starts = run.starts()
-    if not starts or not run.evaluations:
-        raise BootifolError(
-            f"{run_dir} has no {'evaluations' if starts else 'showcase'} to draw; "
-            "let its training come to the end"
-        )
-    videos = videos_of_start(run, starts[0])
+    videos = videos_of_start(run, start)
+    if not videos or not run.episode_lengths(scaled=True):
+        missing = "scaled evaluations" if videos else f"films from start {start}"
+        raise BootifolError(f"{run.path} has no {missing} to draw; give a run that has come to its end")
     with house_style():
         top = 2.9
         layout = _Layout.of(videos, curve_height=1.6, top=0.4)
@@ -195,8 +189,7 @@ def save_readme_picture(run_dir: Path, out_png: Path) -> None:
         axes.set_title("Learning curve: 0 is a random agent, 1 the expert", loc="left", fontsize=10)
         curves = draw_reward_and_strips(lower, videos, layout)
         curves.set_title("Learned reward along episodes from one start", loc="left", fontsize=10)
-        with written_aside(out_png) as aside:
-            figure.savefig(aside, format="png")
+        return figure
 
 
 def _draw_rewards(
