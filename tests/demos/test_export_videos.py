@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from small_demo_sets import WriteSet
+from whole_videos import read_video
 
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.export_videos import Format, export_videos
 from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.demos.manifest import read_manifest, write_manifest
-from bootifol.demos.video_files import frame_rate, read_video, video_paths
+from bootifol.demos.video_files import frame_rate, video_paths
 from bootifol.errors import BootifolError
 
 MEAN_ERROR = {"mp4": 2.0, "lerobot": 0.6}

@@ -2,10 +2,10 @@ from pathlib import Path
 
 import numpy as np
 from test_looks import walking_block
+from whole_videos import read_video
 
 from bootifol.demos.looks import look_at
 from bootifol.demos.near_duplicates import near_duplicates
-from bootifol.demos.video_files import read_video
 from bootifol.demos.video_writing import write_video
 from bootifol.envs.pictures import centered_square
 

@@ -5,9 +5,10 @@ import av
 import numpy as np
 import pytest
 from PIL import Image
+from whole_videos import read_video
 
 from bootifol.demos.decoding import stream_part
-from bootifol.demos.video_files import frame_rate, read_video, stream_video, video_paths
+from bootifol.demos.video_files import frame_rate, stream_video, video_paths
 from bootifol.demos.video_writing import write_video
 from bootifol.errors import BootifolError
 

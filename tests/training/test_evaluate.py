@@ -7,9 +7,10 @@ import shutil
 from pathlib import Path
 
 import pytest
+from tests.demos.whole_videos import read_video
 
 from bootifol.cli.main import main
-from bootifol.demos.video_files import frame_rate, read_video
+from bootifol.demos.video_files import frame_rate
 from bootifol.training.api import evaluate_run
 
 

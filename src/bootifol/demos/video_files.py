@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from bootifol.demos.decoding import declared_rate, stream_file
 from bootifol.demos.folders_and_arrays import (
     natural_order,
@@ -17,7 +15,6 @@ from bootifol.demos.folders_and_arrays import (
 )
 from bootifol.demos.upright import TimedFrame
 from bootifol.errors import BootifolError
-from bootifol.types import Frames
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".m4v", ".webm", ".mkv", ".avi", ".gif")
 ARRAY_SUFFIXES = (".npy", ".npz")
@@ -85,11 +82,6 @@ def stream_video(path: Path) -> Iterator[TimedFrame]:
             f"{path} is not a video bootifol reads: give {', '.join(VIDEO_SUFFIXES)}, .npy or .npz "
             "files, or folders of png or jpg pictures"
         )
-
-
-def read_video(path: Path) -> Frames:
-    """All pictures of a video, uint8 `[frames, H, W, 3]`; errors as `stream_video`."""
-    return np.stack([timed.frame for timed in stream_video(path)])
 
 
 def frame_rate(path: Path) -> float | None:
