@@ -24,7 +24,7 @@ from benchmarks import (
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow, append_evaluations
 from bootifol.reports.comparison import Comparison, compare
-from bootifol.reports.figures import Loss, losses_figure, over_seeds, returns_figure
+from bootifol.reports.figures import Loss, band_over_seeds, losses_figure, returns_figure
 from bootifol.reports.film_strip import expert_above_agent, run_figure
 from bootifol.reports.run_files import Curve, find_runs, read_run
 
@@ -42,7 +42,7 @@ def points(axes: Axes, line: int = 0) -> np.ndarray:
 def test_seeds_are_averaged_where_all_are_known() -> None:
     early = Curve(np.array([0.0, 100.0, 200.0]), np.array([0.0, 10.0, 20.0]))
     late = Curve(np.array([50.0, 150.0]), np.array([1.0, 3.0]))
-    band = over_seeds([early, late])
+    band = band_over_seeds([early, late])
     assert band.steps.tolist() == [50.0, 100.0, 150.0]
     # The first is 5, 10 and 15 there, the second 1, 2 and 3.
     assert band.mean == pytest.approx([3.0, 6.0, 9.0])
@@ -53,7 +53,7 @@ def test_seeds_are_averaged_where_all_are_known() -> None:
 def test_seeds_without_a_common_moment_are_refused() -> None:
     one, two = (Curve(np.array([step]), np.array([1.0])) for step in (1.0, 2.0))
     with pytest.raises(BootifolError, match="no moment in common"):
-        over_seeds([one, two])
+        band_over_seeds([one, two])
 
 
 def test_returns_have_a_panel_a_task_and_a_line_an_agent(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from made_up_runs import write_run
 from synthetic_run import AGENT_STEPS, write_synthetic_run
 
 from bootifol.reports.final_return import final_return
-from bootifol.reports.findings import Finding, findings, number
+from bootifol.reports.findings import Finding, findings, short_number
 from bootifol.reports.run_files import RunFiles, read_run
 
 
@@ -196,4 +196,4 @@ def test_without_an_expert_the_policy_stands_beside_random_actions(shared_run: P
     ("value", "text"), [(386.2, "386"), (9.1667, "9.17"), (-0.7214, "−0.721"), (4223.7, "4224"), (0.0, "0")]
 )
 def test_numbers_are_short(value: float, text: str) -> None:
-    assert number(value) == text
+    assert short_number(value) == text

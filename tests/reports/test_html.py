@@ -9,7 +9,7 @@ from synthetic_run import write_synthetic_run
 
 from bootifol.cli.report import report as report_command
 from bootifol.errors import BootifolError
-from bootifol.reports.html import duration, report
+from bootifol.reports.html import report
 from bootifol.reports.run_files import flattened
 
 
@@ -202,10 +202,3 @@ def test_nested_configurations_are_flattened() -> None:
         ("a.c.d", "None"),
         ("e", "[1, 2]"),
     ]
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"), [(45, "45 s"), (600, "10 min"), (3599, "1 h 00 min"), (9700, "2 h 42 min")]
-)
-def test_durations_are_short(seconds: float, text: str) -> None:
-    assert duration(seconds) == text

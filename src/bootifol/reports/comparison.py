@@ -182,12 +182,12 @@ def _groups(runs: Sequence[RunFiles], agent: Callable[[RunFiles], str], notes: l
     groups = []
     for (task, name), variants in found.items():
         members = [sorted(seeds.values(), key=lambda run: run.seed or 0) for seeds in variants.values()]
-        labels = _labels([terms(runs[0]) for runs in members])
+        labels = _variant_names([terms(runs[0]) for runs in members])
         groups += [Group(task, name, label, tuple(runs)) for label, runs in zip(labels, members, strict=True)]
     return groups
 
 
-def _labels(variants: Sequence[Mapping[str, str]]) -> list[str]:
+def _variant_names(variants: Sequence[Mapping[str, str]]) -> list[str]:
     """What sets each set of terms apart: the fields in which it has not what most of them have."""
     fields = [
         name

@@ -51,7 +51,7 @@ class Loss:
     """The logged losses that it is the sum of."""
 
 
-def over_seeds(curves: Sequence[Curve]) -> Band:
+def band_over_seeds(curves: Sequence[Curve]) -> Band:
     """Mean and interval of the seeds' curves, from where all have begun to where the first ends.
 
     Seeds are not measured at the same moments when a time budget ends them, so each curve is read off the straight
@@ -84,7 +84,7 @@ def returns_figure(comparison: Comparison, by_time: bool = False, scaled: bool =
         BootifolError: there is no run, or one was not evaluated as the others of its task.
     """
     require_groups(comparison)
-    labels = _labels(comparison.groups)
+    labels = _legend_labels(comparison.groups)
     colors = {name: number for number, name in enumerate(labels)}
     panels = []
     for task in comparison.tasks():
@@ -159,7 +159,7 @@ def losses_figure(comparison: Comparison, phase: str, losses: Sequence[Loss]) ->
         for axes, loss, bands in zip(all_axes, losses, panels, strict=True):
             for color, (group, band) in enumerate(zip(comparison.groups, bands, strict=True)):
                 task = f"{task_title(group.task)}, " if several else ""
-                _draw(axes, band, color, f"{task}{_labels([group])[group.name]}")
+                _draw(axes, band, color, f"{task}{_legend_labels([group])[group.name]}")
             axes.set_title(loss.title, loc="left", fontsize=9.5)
             if axes.get_ylim()[0] > 0:
                 axes.set_ylim(bottom=0)
@@ -213,12 +213,12 @@ def _returns(group: Group, length: int, by_time: bool, scaled: bool) -> Band:
         episodes = [returns_of(rows, scaled) for rows in evaluations]
         curves.append(Curve(np.array(moments, float), np.array([np.mean(returns) for returns in episodes])))
     if len(curves) > 1:
-        return over_seeds(curves)
+        return band_over_seeds(curves)
     return _band(curves[0].steps, episodes)
 
 
 def _losses(group: Group, phase: str, loss: Loss) -> Band:
-    return over_seeds([_summed(run, phase, loss) for run in group.runs])
+    return band_over_seeds([_summed(run, phase, loss) for run in group.runs])
 
 
 def _summed(run: RunFiles, phase: str, loss: Loss) -> Curve:
@@ -275,7 +275,7 @@ def _caption(figure: Figure, text: str) -> None:
     figure.supxlabel(text, fontsize=8, color=FAINT, x=0.99, ha="right")
 
 
-def _labels(groups: Sequence[Group]) -> dict[str, str]:
+def _legend_labels(groups: Sequence[Group]) -> dict[str, str]:
     """Labels of the legend by name, such as `ViRL, 3 to 5 seeds` where that differs between tasks."""
     counts: dict[str, list[int]] = {}
     for group in groups:

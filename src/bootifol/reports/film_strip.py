@@ -17,7 +17,7 @@ from bootifol.reports.run_files import RunFiles, ShowcaseVideo
 from bootifol.reports.style import FAINT, KIND_COLORS, KIND_NAMES, RUN_COLORS, house_style
 from bootifol.types import Rewards, Video
 
-KINDS = ("expert", "agent", "random")
+SHOWN_KINDS = ("expert", "agent", "random")
 """Whose pictures are shown, from top to bottom."""
 
 WIDTH = 10.4
@@ -35,7 +35,7 @@ PICTURE_SHARE = 0.97
 
 def videos_of_start(run: RunFiles, start: int) -> dict[str, ShowcaseVideo]:
     """The episodes that begin in one start, by kind, in the order they are shown."""
-    return {kind: run.showcase[kind, start] for kind in KINDS if (kind, start) in run.showcase}
+    return {kind: run.showcase[kind, start] for kind in SHOWN_KINDS if (kind, start) in run.showcase}
 
 
 def reward_above_film_strip(videos: Mapping[str, ShowcaseVideo]) -> Figure:

@@ -30,7 +30,7 @@ FEWEST_REWARDS = 20
 """Records of the learned reward; a quarter is five."""
 
 
-def number(value: float) -> str:
+def short_number(value: float) -> str:
     """A value for reading: three digits that count, and a real minus sign."""
     text = f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
     return text.replace("-", "\N{MINUS SIGN}")
@@ -70,14 +70,14 @@ def _policy(run: RunFiles) -> Finding | None:
         return _policy_without_scale(run, final)
     value = final.scaled_return.mean
     levels = run.return_levels(final.episode_steps)
-    ends = "" if levels is None else f" (random {number(levels[0])}, expert {number(levels[1])})"
+    ends = "" if levels is None else f" (random {short_number(levels[0])}, expert {short_number(levels[1])})"
     solved = (
         ""
         if final.successes is None
         else f", {final.successes} of {final.scaled_return.count} episodes solved"
     )
     text = (
-        f"The policy returns {number(final.environment_return.mean)} in {final.episode_steps} agent steps{ends}: "
+        f"The policy returns {short_number(final.environment_return.mean)} in {final.episode_steps} agent steps{ends}: "
         f"{_percent(value)} of the way from random to expert{solved}."
     )
     return Finding(_verdict(value, good=0.8, fair=0.2), text)
@@ -85,7 +85,7 @@ def _policy(run: RunFiles) -> Finding | None:
 
 def _policy_without_scale(run: RunFiles, final: FinalReturn) -> Finding:
     """Nobody measured an expert: what can be said are successes, and random actions from the same few starts."""
-    mean = number(final.environment_return.mean)
+    mean = short_number(final.environment_return.mean)
     text = f"The policy returns {mean} in episodes of {final.episode_steps} agent steps"
     returns = {
         kind: [
@@ -96,7 +96,7 @@ def _policy_without_scale(run: RunFiles, final: FinalReturn) -> Finding:
         for kind in ("agent", "random")
     }
     if all(returns.values()):
-        agent, random = (number(float(np.mean(of_kind))) for of_kind in returns.values())
+        agent, random = (short_number(float(np.mean(of_kind))) for of_kind in returns.values())
         text += f", and in the training episodes shown below {agent} where random actions return {random}"
     if final.successes is not None:
         count = final.environment_return.count
@@ -138,12 +138,12 @@ def _cloning(run: RunFiles) -> Finding | None:
     if change is None:
         return None
     text = (
-        f"Cloning the videos took the true return in {length} agent steps from {number(change.first.mean)} to "
-        f"{number(change.last.mean)}"
+        f"Cloning the videos took the true return in {length} agent steps from {short_number(change.first.mean)} to "
+        f"{short_number(change.last.mean)}"
     )
     if after_last and after_last != after:
         mean = np.mean([row.environment_return for row in after_last[0]])
-        text += f"; after the last Cloning Phase it was {number(float(mean))}"
+        text += f"; after the last Cloning Phase it was {short_number(float(mean))}"
     verdict: dict[Direction, Verdict] = {"up": "good", "unclear": "fair", "down": "poor"}
     return Finding(verdict[change.direction], f"{text}.")
 
@@ -173,9 +173,9 @@ def _following(run: RunFiles) -> Finding | None:
         return None
     text = (
         f"{'After the Cloning Phase' if cloned else 'In its training episodes'} the agent earned a learned reward of "
-        f"{number(earned.first.mean)} per step at first and {number(earned.last.mean)} at last"
+        f"{short_number(earned.first.mean)} per step at first and {short_number(earned.last.mean)} at last"
     )
-    ends = f"from {number(returned.first.mean)} to {number(returned.last.mean)} in {length} agent steps"
+    ends = f"from {short_number(returned.first.mean)} to {short_number(returned.last.mean)} in {length} agent steps"
     if cloned:
         return _after_cloning(returned.direction, text, ends)
     policy = _policy(run)
@@ -238,8 +238,8 @@ def _showcase(run: RunFiles) -> Finding | None:
     if len(totals) < 3:
         return None
     text = (
-        f"From the same starts, an episode earns a learned reward of {number(totals['expert'])} when the expert acts, "
-        f"{number(totals['agent'])} for the agent and {number(totals['random'])} for random actions"
+        f"From the same starts, an episode earns a learned reward of {short_number(totals['expert'])} when the expert "
+        f"acts, {short_number(totals['agent'])} for the agent and {short_number(totals['random'])} for random actions"
     )
     if totals["expert"] <= totals["random"]:
         return Finding("poor", f"{text}: the reward does not tell expert from random here.")

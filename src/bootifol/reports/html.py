@@ -13,13 +13,15 @@ from matplotlib.figure import Figure
 
 from bootifol.evaluation.summary import Summary
 from bootifol.files import written_aside
+from bootifol.progress import duration
 from bootifol.reports import plots
 from bootifol.reports.comparison import compare
-from bootifol.reports.film_strip import KINDS, reward_above_film_strip, videos_of_start
+from bootifol.reports.film_strip import SHOWN_KINDS, reward_above_film_strip, videos_of_start
 from bootifol.reports.final_return import FinalReturn, final_return
-from bootifol.reports.findings import Finding, findings, number, scores_or_none
+from bootifol.reports.findings import Finding, findings, scores_or_none, short_number
 from bootifol.reports.names import task_title
 from bootifol.reports.plots import RunLook, common_length, looks_of
+from bootifol.reports.result_tables import fixed_number
 from bootifol.reports.run_files import COUNTERS, RunFiles, find_runs, flattened, read_run
 from bootifol.reports.style import KIND_COLORS, svg_data_uri, thousands
 from bootifol.types import AnyPath
@@ -243,20 +245,24 @@ def _tiles(run: RunFiles) -> list[Tile]:
 def _return_tiles(run: RunFiles, final: FinalReturn) -> list[Tile]:
     episodes = f"{final.environment_return.count} episodes of {final.episode_steps} agent steps"
     levels = run.return_levels(final.episode_steps)
-    against = episodes if levels is None else f"random {number(levels[0])}, expert {number(levels[1])}"
+    against = (
+        episodes if levels is None else f"random {short_number(levels[0])}, expert {short_number(levels[1])}"
+    )
     tiles = []
     if final.scaled_return is not None:
         scaled = final.scaled_return
-        tiles.append(Tile("Scaled return", f"{scaled.mean:.2f}", f"{_interval(scaled)}{episodes}"))
-    tiles.append(Tile("Return", number(final.environment_return.mean), against))
+        tiles.append(
+            Tile("Scaled return", fixed_number(scaled.mean, "scaled"), f"{_interval(scaled)}{episodes}")
+        )
+    tiles.append(Tile("Return", short_number(final.environment_return.mean), against))
     return tiles
 
 
 def _interval(summary: Summary) -> str:
     if summary.interval is None:
         return ""
-    low, high = summary.interval
-    return f"95% interval {low:.2f} to {high:.2f}, "
+    low, high = (fixed_number(end, "scaled") for end in summary.interval)
+    return f"95% interval {low} to {high}, "
 
 
 def _curve_cards(looks: Sequence[RunLook]) -> list[Card]:
@@ -358,7 +364,7 @@ def _video_rows(run: RunFiles) -> list[list[PlayedVideo]]:
     expert = any(kind == "expert" for kind, _ in run.video_files)
     for start in sorted({start for _, start in run.video_files})[:SHOWN_STARTS]:
         row = []
-        for kind in (kind for kind in KINDS if kind != "random" or not expert):
+        for kind in (kind for kind in SHOWN_KINDS if kind != "random" or not expert):
             path = run.video_files.get((kind, start))
             if path is None:
                 continue
@@ -374,11 +380,3 @@ def _video_rows(run: RunFiles) -> list[list[PlayedVideo]]:
             )
         rows.append(row)
     return [row for row in rows if row]
-
-
-def duration(seconds: float) -> str:
-    """A wall-clock time, short: 45 s, 12 min, 2 h 41 min."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"

@@ -205,7 +205,7 @@ def _scale_notes(comparison: Comparison) -> list[str]:
     return notes
 
 
-def number(value: float, measure: Measure) -> str:
+def fixed_number(value: float, measure: Measure) -> str:
     """A return with the digits of its tables, and a real minus sign."""
     # Adding 0 turns a rounded -0 into 0.
     rounded = round(value, DECIMALS[measure]) + 0.0
@@ -218,7 +218,7 @@ def _told_seeds(group: Group) -> str:
     if not 1 < len(finals) <= FEW_SEEDS:
         return group.seeds
     measure: Measure = "scaled" if seed_means(finals, "scaled") else "absolute"
-    means = ", ".join(number(mean, measure) for mean in seed_means(finals, measure))
+    means = ", ".join(fixed_number(mean, measure) for mean in seed_means(finals, measure))
     return f"{group.seeds} with {measure} means {means}"
 
 

@@ -10,7 +10,14 @@ from pathlib import Path
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.reports.names import task_title
-from bootifol.reports.result_tables import Measure, ResultRow, Results, ResultTable, number, result_tables
+from bootifol.reports.result_tables import (
+    Measure,
+    ResultRow,
+    Results,
+    ResultTable,
+    fixed_number,
+    result_tables,
+)
 from bootifol.reports.run_files import find_runs, read_run
 from bootifol.types import AnyPath
 
@@ -128,7 +135,7 @@ def _cells(row: ResultRow, measure: Measure) -> tuple[str, ...]:
     """Agent, seeds, episodes, mean, interquartile mean, the paper's number."""
     paper = _paper(row, measure)
     if row.summary is None:
-        level = NOTHING if row.level is None else number(row.level, measure)
+        level = NOTHING if row.level is None else fixed_number(row.level, measure)
         return row.agent, _count(len(row.runs)), _count(row.episodes), level, NOTHING, paper
     mark = " †" if len(row.runs) == 1 else ""
     mean = _with_interval(row.summary.mean, row.summary.interval, measure)
@@ -140,7 +147,7 @@ def _paper(row: ResultRow, measure: Measure) -> str:
     if row.paper is None or (measure == "scaled" and row.paper.scaled is None):
         return NOTHING
     if row.paper.scaled is not None and measure == "scaled":
-        return number(row.paper.scaled, measure)
+        return fixed_number(row.paper.scaled, measure)
     # With the digits that the paper prints.
     return f"{row.paper.absolute:.2f} ± {row.paper.deviation:.2f}"
 
@@ -151,9 +158,9 @@ def _count(count: int) -> str:
 
 def _with_interval(value: float, interval: tuple[float, float] | None, measure: Measure) -> str:
     if interval is None:
-        return number(value, measure)
+        return fixed_number(value, measure)
     low, high = interval
-    return f"{number(value, measure)} [{number(low, measure)}, {number(high, measure)}]"
+    return f"{fixed_number(value, measure)} [{fixed_number(low, measure)}, {fixed_number(high, measure)}]"
 
 
 def _record(row: ResultRow, measure: Measure) -> dict[str, object]:
