@@ -18,8 +18,6 @@ from benchmarks import (
     figure_returns,
     figure_run,
     figure_sequence_loss,
-    table_dm_control,
-    table_meta_world,
 )
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow, append_evaluations
@@ -255,17 +253,6 @@ def test_a_run_without_films_is_named(tmp_path: Path, capsys: pytest.CaptureFixt
     run_dir = write_run(tmp_path / "a")
     assert figure_demonstrations.main([str(run_dir), "--out", str(tmp_path / "figure.png")]) == 2
     assert f"{run_dir} has no film of expert and agent from start 0" in capsys.readouterr().err
-
-
-def test_the_papers_tables_are_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_run(tmp_path / "a")
-    write_run(tmp_path / "b", task="drawn_home")
-    assert table_dm_control.main([str(tmp_path)]) == 0
-    printed = capsys.readouterr().out
-    assert "Table 5 of the paper" in printed
-    assert "Drawn Home" not in printed
-    assert table_meta_world.main([str(tmp_path)]) == 2
-    assert "none of the runs is on button_press, plate_slide, drawer_close" in capsys.readouterr().err
 
 
 def test_any_metric_has_a_panel_and_every_run_a_line(

@@ -145,6 +145,18 @@ def test_markdown_shows_numbers_notes_and_the_dagger_of_a_single_seed(tmp_path: 
     assert f"- {tmp_path / 'cut'} (BootIfOL on Reacher Hard) is unfinished and left out" in printed
 
 
+def test_a_table_may_be_of_some_tasks_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, task in (("a", "reacher_hard"), ("b", "drawn_home"), ("c", "button_press")):
+        write_run(tmp_path / name, task=task)
+    assert main(["table", str(tmp_path), "--tasks", "reacher_hard", "drawn_home"]) == 0
+    printed = capsys.readouterr().out
+    assert "Table 5 of the paper" in printed and "Drawn Home" in printed
+    assert "Table 6 of the paper" not in printed and "Button Press" not in printed
+    assert main(["table", str(tmp_path), "--tasks", "reacher_hard", "hoper_stand"]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "none of the runs is on hoper_stand; they are on reacher_hard, drawn_home, button_press" in told
+
+
 def test_latex_is_balanced_and_escaped(tmp_path: Path) -> None:
     write_run(tmp_path / "my_runs" / "50%")
     table([tmp_path], tmp_path / "table.tex")

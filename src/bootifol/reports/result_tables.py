@@ -85,13 +85,15 @@ def result_tables(runs: Sequence[RunFiles], tasks: Collection[str] | None = None
         tasks: the only ones to show; None for all.
 
     Raises:
-        BootifolError: there is no finished run, or none on these tasks.
+        BootifolError: there is no finished run, or none on one of these tasks.
     """
-    chosen = [run for run in runs if tasks is None or run.task in tasks]
-    if not chosen:
+    found = dict.fromkeys(run.task for run in runs)
+    missing = [task for task in tasks or () if task not in found]
+    if missing:
         raise BootifolError(
-            f"none of the runs is on {', '.join(tasks or ['any task'])}; give directories of runs on these tasks"
+            f"none of the runs is on {', '.join(missing)}; they are on {', '.join(found) or 'no task'}"
         )
+    chosen = [run for run in runs if tasks is None or run.task in tasks]
     comparison = compare(chosen)
     if not comparison.groups:
         raise BootifolError("there is no finished run to make a table of: " + " ".join(comparison.notes))
