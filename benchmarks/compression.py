@@ -25,7 +25,7 @@ import torch
 from numpy.typing import NDArray
 
 from benchmarks.command import command
-from benchmarks.rows import Row, markdown, write_rows
+from benchmarks.rows import Row, write_rows
 from benchmarks.task_rankings import Setup, aligned, recorded
 from bootifol.demos.augmentation import AugmentationConfig, augmented
 from bootifol.demos.demo_set import DemoSet
@@ -35,6 +35,7 @@ from bootifol.demos.record import HALF_GOOD_VIDEOS
 from bootifol.errors import require_at_least
 from bootifol.evaluation.ranking import KINDS, area_under_curve
 from bootifol.memory import keep_freed_memory
+from bootifol.reports.markdown import markdown_table
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.references import draw_references
 from bootifol.tasks import TASKS
@@ -138,7 +139,7 @@ def report(rows: Sequence[Row]) -> str:
         for kind in KINDS
         for pictures in PICTURES
     }
-    means = markdown(
+    means = markdown_table(
         ["augmentation", *(f"{kind}, {pictures}" for kind in KINDS for pictures in PICTURES)],
         [
             [
@@ -148,7 +149,7 @@ def report(rows: Sequence[Row]) -> str:
             for name in names
         ],
     )
-    areas = markdown(
+    areas = markdown_table(
         ["augmentation", "expert > half-good", "half-good > random", "crossed", "shift"],
         [[name, *(f"{value:.2f}" for value in summarized(rewards, name))] for name in names],
     )

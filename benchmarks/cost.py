@@ -31,7 +31,6 @@ from rich.console import Console
 from benchmarks.command import command
 from benchmarks.process_memory import status_bytes
 from benchmarks.resumable_table import ResumableTable
-from benchmarks.rows import markdown
 from benchmarks.run_queue import PROGRAM, missing_demos, record_words
 from benchmarks.suites import (
     RANDOM,
@@ -46,6 +45,7 @@ from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.presets import PRESETS, preset
 from bootifol.replay.buffer import ReplayBuffer
+from bootifol.reports.markdown import markdown_table
 from bootifol.tasks import short_name
 from bootifol.training.alignment import alignment_phase
 from bootifol.training.cloning import cloning_phase
@@ -151,7 +151,7 @@ def compare(arguments: argparse.Namespace) -> None:
             if finished.returncode:
                 raise BootifolError(f"{system.name} could not be measured: its own message is above")
             results.add(json.loads(finished.stdout.splitlines()[-1]))
-    table = markdown(list(COLUMNS.values()), [list(row.values()) for row in results.rows]) + "\n"
+    table = markdown_table(list(COLUMNS.values()), [list(row.values()) for row in results.rows]) + "\n"
     with written_aside(out.with_suffix(".md")) as aside:
         aside.write_text(table)
     print(table, end="")

@@ -28,13 +28,13 @@ from torch.utils.flop_counter import FlopCounterMode
 from benchmarks.command import command
 from benchmarks.plain.bootifol import PlainBootifol
 from benchmarks.plain.drqv2 import PlainDrQv2, PlainReplay
-from benchmarks.rows import markdown
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.envs.pictures import RenderProfile
 from bootifol.memory import keep_freed_memory
 from bootifol.presets import CPU, PAPER
 from bootifol.progress import progress
 from bootifol.replay.buffer import ReplayBuffer
+from bootifol.reports.markdown import markdown_table
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.tasks import make_environment
@@ -331,7 +331,7 @@ def main() -> None:
         f"{arguments.threads} thread(s), {rates.arithmetic / 1e9:.0f} GFLOP/s in bf16, copies of "
         f"{rates.copy / 1e9:.1f} GB/s\n"
     )
-    print(markdown(HEADER, rows))
+    print(markdown_table(HEADER, rows))
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ import numpy as np
 from tests.demos.awkward_files import make_all
 
 from benchmarks.command import command
+from bootifol.reports.markdown import markdown_table
 
 BAD = ("crash", "hang", "exception", "short read")
 
@@ -180,10 +181,11 @@ def main() -> int:
         reader.stop()
     outcomes = ("read", "read otherwise", "refused", *BAD)
     print(f"{number} damaged files in {arguments.minutes:g} minutes, seed {arguments.seed}\n")
-    print("| damage | " + " | ".join(outcomes) + " |\n|---|" + "---|" * len(outcomes))
-    for damage in DAMAGES:
-        counts = " | ".join(str(table[damage.__name__, outcome]) for outcome in outcomes)
-        print(f"| {damage.__name__} | {counts} |")
+    lines = [
+        [damage.__name__, *(str(table[damage.__name__, outcome]) for outcome in outcomes)]
+        for damage in DAMAGES
+    ]
+    print(markdown_table(["damage", *outcomes], lines))
     print("\n" + "\n".join(failures[:30]) if failures else "\nno crash, no hang, no short read")
     return 1 if failures else 0
 

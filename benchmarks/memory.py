@@ -42,13 +42,13 @@ from scipy.stats import linregress
 from benchmarks.command import command
 from benchmarks.paper_size_demos import MB
 from benchmarks.process_memory import status_bytes
-from benchmarks.rows import markdown
 from benchmarks.run_queue import PROGRAM
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.errors import BootifolError, require_at_least
 from bootifol.memory import keep_freed_memory
 from bootifol.presets import preset
 from bootifol.replay.buffer import ReplayBuffer
+from bootifol.reports.markdown import markdown_table
 from bootifol.training.budget import Budget, Counters
 from bootifol.training.components import Components, build_components, build_environment, build_learners
 from bootifol.training.interactive import InteractivePhase
@@ -322,7 +322,7 @@ def stores_table(stores: Sequence[Reading], process: int) -> str:
         ]
         for reading in (*stores, together, whole)
     ]
-    return markdown(header, cells)
+    return markdown_table(header, cells)
 
 
 def growth_table(found: Growth) -> str:
@@ -342,7 +342,7 @@ def growth_table(found: Growth) -> str:
         f"{found.slope:.1f}",
         f"{found.error:.1f}",
     ]
-    return markdown(header, [cells])
+    return markdown_table(header, [cells])
 
 
 if __name__ == "__main__":

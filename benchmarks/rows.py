@@ -1,4 +1,4 @@
-"""Result tables of benchmarks: CSV files that are always whole, and Markdown to paste into docs."""
+"""Result tables of benchmarks: CSV files that are always whole."""
 
 from __future__ import annotations
 
@@ -39,9 +39,3 @@ def write_rows(path: Path, columns: Sequence[str], rows: Sequence[Row]) -> None:
     writer.writerows(rows)
     with written_aside(path) as aside:
         aside.write_text(text.getvalue())
-
-
-def markdown(header: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
-    """A Markdown table."""
-    lines = [header, ["---"] * len(header), *cells]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

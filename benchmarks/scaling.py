@@ -42,7 +42,6 @@ from benchmarks.engine import (
     label_episode,
 )
 from benchmarks.resumable_table import ResumableTable
-from benchmarks.rows import markdown
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.manifest import Manifest, Shard, VideoEntry, write_manifest
 from bootifol.demos.shards import sha256_of_frames, videos_per_shard, write_shard
@@ -51,6 +50,7 @@ from bootifol.memory import keep_freed_memory
 from bootifol.networks.frame_encoders import picture_sizes
 from bootifol.presets import preset
 from bootifol.progress import progress
+from bootifol.reports.markdown import markdown_table
 from bootifol.reports.style import FAINT, RUN_COLORS, RUN_DASHES, house_style, legend_above, save_png
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.training.config import TrainingConfig
@@ -282,7 +282,7 @@ def tables(rows: Sequence[Mapping[str, str]]) -> Iterator[str]:
             times = [f"{curve[size]:.3g}" if size in curve else "" for size in panel.sizes]
             cells.append([stage, *times, "" if slope is None else f"{slope:.2f}"])
         sizes = [f"{size}²" if panel.power == 2 else str(size) for size in panel.sizes]
-        yield markdown([f"ms by {panel.label}", *sizes, "last slope"], cells)
+        yield markdown_table([f"ms by {panel.label}", *sizes, "last slope"], cells)
 
 
 def drawn(rows: Sequence[Mapping[str, str]]) -> Figure:

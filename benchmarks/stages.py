@@ -33,10 +33,10 @@ from rich.console import Console
 
 from benchmarks.command import command
 from benchmarks.engine import measured_rates, operations_of
-from benchmarks.rows import markdown
 from bootifol.cli.train import preset_of
 from bootifol.demos.augmentation import augmented
 from bootifol.progress import progress
+from bootifol.reports.markdown import markdown_table
 from bootifol.rewards.references import draw_references
 from bootifol.tracking import Tracker
 from bootifol.training.config import TrainingConfig
@@ -252,7 +252,7 @@ def measure(
         ["all", f"{steps:,} agent steps", "", "", f"{total / steps:.2f}", f"{total / 6e4:.0f} minutes"]
     )
     print(f"{config.threads} thread(s), {arithmetic / 1e9:.0f} GFLOP/s in bf16\n")
-    print(markdown(HEADER, cells))
+    print(markdown_table(HEADER, cells))
 
 
 @command()

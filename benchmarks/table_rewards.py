@@ -20,6 +20,7 @@ from benchmarks.command import command
 from bootifol.evaluation.tables import RankingRow
 from bootifol.reports.comparison import Group, compare
 from bootifol.reports.findings import scores_or_none
+from bootifol.reports.markdown import markdown_table
 from bootifol.reports.names import task_title
 from bootifol.reports.run_files import find_runs, read_run
 
@@ -103,8 +104,7 @@ def main(words: Sequence[str] | None = None) -> None:
     )
     arguments = parser.parse_args(words)
     comparison = compare([read_run(directory) for directory in find_runs(arguments.runs)])
-    for line in (HEADER, ("---",) * len(HEADER), *map(rows_of, comparison.groups)):
-        print(f"| {' | '.join(line)} |")
+    print(markdown_table(HEADER, [rows_of(group) for group in comparison.groups]))
     for note in comparison.notes:
         print(f"\n- {note}")
 

@@ -26,7 +26,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from benchmarks.command import command
-from benchmarks.rows import Row, markdown, read_rows, write_rows
+from benchmarks.rows import Row, read_rows, write_rows
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.record import HALF_GOOD_VIDEOS, record_demos
 from bootifol.errors import BootifolError, require_at_least
@@ -44,6 +44,7 @@ from bootifol.experts.behaviors import Behavior
 from bootifol.memory import keep_freed_memory
 from bootifol.presets import preset
 from bootifol.progress import progress
+from bootifol.reports.markdown import markdown_table
 from bootifol.reports.paper_results import RETURNS
 from bootifol.reports.style import KIND_COLORS, KIND_NAMES, house_style, save_png
 from bootifol.rewards.bootifol.model import BootifolRewardModel
@@ -202,7 +203,7 @@ def report(rows: Sequence[Row]) -> str:
         ]
         for row in rows
     ]
-    return markdown(["task", *MEASURE_NAMES, "tau of a perfect order"], cells)
+    return markdown_table(["task", *MEASURE_NAMES, "tau of a perfect order"], cells)
 
 
 def draw(rewards: dict[str, list[RankingRow]], rows: Sequence[Row], path: Path) -> None:

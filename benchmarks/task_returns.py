@@ -22,12 +22,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.command import command
-from benchmarks.rows import Row, markdown, read_rows, write_rows
+from benchmarks.rows import Row, read_rows, write_rows
 from bootifol.errors import require_at_least
 from bootifol.evaluation.returns import EpisodeResult, behavior_results, unseen_environment
 from bootifol.evaluation.summary import summarize
 from bootifol.experts import Behavior
 from bootifol.progress import progress
+from bootifol.reports.markdown import markdown_table
 from bootifol.reports.paper_results import RETURNS
 from bootifol.reports.result_tables import ENDS
 from bootifol.tasks import TASKS, Task
@@ -153,13 +154,17 @@ def report(tasks: Sequence[Task], rows: Sequence[Row]) -> str:
                 [name, *(with_interval(found.get((task.name, who, steps))) for who in ("expert", "random"))]
             )
     parts = [
-        markdown(["return", "expert", "half-good", "random", "the paper's expert", "its random"], returns),
-        markdown(
+        markdown_table(
+            ["return", "expert", "half-good", "random", "the paper's expert", "its random"], returns
+        ),
+        markdown_table(
             ["success", "expert", "half-good", "random", "expert, training episode", "its return"], successes
         ),
     ]
     if limited:
-        parts.append(markdown([f"return in {META_WORLD_LIMIT} simulator steps", "expert", "random"], limited))
+        parts.append(
+            markdown_table([f"return in {META_WORLD_LIMIT} simulator steps", "expert", "random"], limited)
+        )
     names = {task.name for task in tasks}
     notes = dict.fromkeys(
         f"`{row['task']}`: {row['note']}." for row in rows if row["note"] and row["task"] in names

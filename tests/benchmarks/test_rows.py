@@ -1,7 +1,7 @@
 from pathlib import Path
 
 import pytest
-from benchmarks.rows import markdown, read_rows, write_rows
+from benchmarks.rows import read_rows, write_rows
 
 from bootifol.errors import BootifolError
 
@@ -14,7 +14,3 @@ def test_rows_read_back_as_they_were_written(tmp_path: Path) -> None:
     assert read_rows(path, ("task", "note")) == rows
     with pytest.raises(BootifolError, match=r"table.csv is another table: its first line should be task,who"):
         read_rows(path, ("task", "who"))
-
-
-def test_a_markdown_table() -> None:
-    assert markdown(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"

@@ -6,6 +6,7 @@ from made_up_runs import write_run
 
 from bootifol.cli.main import main
 from bootifol.errors import BootifolError
+from bootifol.reports.markdown import markdown_table
 from bootifol.reports.paper_results import TABLES
 from bootifol.reports.result_tables import ResultRow, Results, result_tables
 from bootifol.reports.run_files import find_runs, read_run
@@ -132,6 +133,11 @@ def test_no_finished_run_is_an_error_that_says_why(tmp_path: Path) -> None:
     write_run(tmp_path / "a", agent_steps=10)
     with pytest.raises(BootifolError, match=r"no finished run to make a table of: .*10 of 1,000 agent steps"):
         results_of(tmp_path)
+
+
+def test_a_markdown_table() -> None:
+    assert markdown_table(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"
+    assert markdown_table("ab", [], ["-", "-:"]) == "| a | b |\n| - | -: |"
 
 
 def test_markdown_shows_numbers_notes_and_the_dagger_of_a_single_seed(tmp_path: Path) -> None:

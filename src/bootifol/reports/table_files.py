@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
+from bootifol.reports.markdown import markdown_table
 from bootifol.reports.names import task_title
 from bootifol.reports.result_tables import (
     Measure,
@@ -67,13 +68,9 @@ def markdown(results: Results) -> str:
     for each in results.tables:
         lines = [HEADER, *_lines(each)]
         widths = [max(len(line[column]) for line in lines) for column in range(len(HEADER))]
-        rows = [" | ".join(_aligned(line, widths)) for line in lines]
-        rule = " | ".join(
-            "-" * width if column < 2 else "-" * (width - 1) + ":" for column, width in enumerate(widths)
-        )
-        parts.append(
-            "\n".join([f"**{each.title}**", "", *(f"| {row} |" for row in [rows[0], rule, *rows[1:]])])
-        )
+        header, *rows = [_aligned(line, widths) for line in lines]
+        rule = ["-" * width if column < 2 else "-" * (width - 1) + ":" for column, width in enumerate(widths)]
+        parts.append(f"**{each.title}**\n\n{markdown_table(header, rows, rule)}")
     parts.append("\n".join(f"- {note}" for note in results.notes))
     return "\n\n".join(parts) + "\n"
 
