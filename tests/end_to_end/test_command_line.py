@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import csv
+import html
+import json
+import re
 import shlex
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -84,8 +89,25 @@ def test_score_rewards_video_files_and_demo_sets(
 
 
 def test_report_compares_runs(run: Path, tmp_path: Path) -> None:
-    assert main(["report", str(run), str(run), "--out", str(tmp_path / "both.html")]) == 0
-    assert (tmp_path / "both.html").stat().st_size > 10_000
+    """Another seed, which has come half the way of its 600 agent steps."""
+    other = tmp_path / "runs" / "other"
+    shutil.copytree(run, other, ignore=shutil.ignore_patterns("checkpoints"))
+    config = json.loads((run / "config.json").read_text())
+    config["seed"] = 2
+    config["config"]["interactive"]["agent_steps"] = 600
+    (other / "config.json").write_text(json.dumps(config))
+    out = tmp_path / "both.html"
+    assert main(["report", str(run), str(tmp_path / "runs"), "--out", str(out)]) == 0
+    page = html.unescape(out.read_text())
+    assert "2 runs side by side" in page
+    assert f"{other} (BootIfOL on Drawn Reach) is unfinished and counts as far as it has come" in page
+    assert "it has trained for 300 of 600 agent steps" in page
+    assert "interactive.agent_steps (300 / 600)" in page
+    pictures = re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)
+    both = [
+        svg for svg in map(base64.b64decode, pictures) if all(f"seed {seed}".encode() in svg for seed in "12")
+    ]
+    assert any(b"scaled return" in svg for svg in both) and any(b"-step episodes" in svg for svg in both)
 
 
 def test_an_ended_run_can_be_resumed_without_training_again(run: Path) -> None:
