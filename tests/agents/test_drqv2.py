@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 import torch
 from benchmarks.plain.drqv2 import PlainDrQv2, PlainEncoder
+from torch import nn
 
 from bootifol.agents.config import DrQv2Config
 from bootifol.agents.drqv2 import (
     DrQv2,
     actor_loss,
+    cloning_loss,
     critic_loss,
     critic_target,
     noisy_action,
@@ -20,7 +22,7 @@ from bootifol.agents.drqv2 import (
 )
 from bootifol.errors import BootifolError
 from bootifol.files import read_arrays, write_arrays
-from bootifol.types import Batch
+from bootifol.types import Batch, StepMetrics
 
 SIZE, STACK, ACTIONS, BATCH = 24, 2, 3, 16
 SMALL = DrQv2Config(feature_dim=8, hidden_dim=16, batch_size=BATCH, precision="fp32", warm_up_steps=0)
@@ -247,25 +249,79 @@ def test_cloning_trains_encoder_and_actor_and_nothing_else() -> None:
         assert np.array_equal(before[name], after[name]) == name.startswith(("critic.", "target_critic."))
 
 
-def test_demonstrated_rows_pull_actor_and_encoder_and_other_rows_do_not() -> None:
-    """With rewards that leave the critic as it is, only the cloning loss is left to train the encoder."""
-    agent = make_agent(dataclasses.replace(SMALL, cloning_weight=1.0))
+def cloning_agent(critic_bias: float = 0.0) -> DrQv2:
+    """With equal critics, which a `satisfied` batch leaves as they are."""
+    agent = make_agent(dataclasses.replace(SMALL, cloning_weight=10.0))
+    with torch.no_grad():
+        agent.critic.q1.output.bias.fill_(critic_bias)
     agent.critic.q2.load_state_dict(agent.critic.q1.state_dict())
-    batch = make_batch()
+    return agent
+
+
+def satisfied(agent: DrQv2, batch: Batch) -> Batch:
+    """The batch with the rewards that the critic expects: its loss is 0, and only cloning trains the encoder."""
     with torch.no_grad():
         reward, _ = agent.critic(agent.encoder(batch.observation.float()), batch.action)
-    batch = dataclasses.replace(batch, reward=reward, discount=torch.zeros(BATCH))
-    first = torch.arange(BATCH) < 2
+    return dataclasses.replace(batch, reward=reward, discount=torch.zeros(BATCH))
 
-    def encoder_after(batch: Batch) -> np.ndarray:
-        tried = make_agent(agent.config)
-        tried.load_state(agent.state())
-        tried.update(batch, 0)
-        return tried.state()["encoder.first.weight"]
 
-    none, some = (dataclasses.replace(batch, demonstrated=rows) for rows in (None, first))
-    np.testing.assert_array_equal(encoder_after(none), agent.state()["encoder.first.weight"])
-    assert not np.array_equal(encoder_after(some), encoder_after(none))
+def updated(agent: DrQv2, batch: Batch) -> tuple[DrQv2, StepMetrics]:
+    """A copy of the agent after an update, and the metrics of that."""
+    copy = make_agent(agent.config)
+    copy.load_state(agent.state())
+    return copy, copy.update(batch, 0)
+
+
+SHOWN = torch.arange(BATCH) < 3
+
+
+def test_demonstrated_rows_pull_actor_and_encoder() -> None:
+    agent = cloning_agent()
+    batch = satisfied(agent, make_batch())
+    cloned, _ = updated(agent, dataclasses.replace(batch, demonstrated=SHOWN))
+    other, _ = updated(agent, batch)
+
+    def distance(encoder: nn.Module, actor: nn.Module) -> float:
+        with torch.no_grad():
+            action = actor(encoder(batch.observation.float()))
+        return float(cloning_loss(action[SHOWN], batch.action[SHOWN]))
+
+    before = distance(agent.encoder, agent.actor)
+    assert distance(other.encoder, agent.actor) == before > distance(cloned.encoder, agent.actor)
+    assert distance(agent.encoder, cloned.actor) < min(before, distance(agent.encoder, other.actor))
+
+
+def test_other_rows_do_not_pull() -> None:
+    agent = cloning_agent()
+    batch = dataclasses.replace(make_batch(), demonstrated=SHOWN)
+    changed = dataclasses.replace(batch, action=torch.where(SHOWN[:, None], batch.action, -batch.action))
+    (one, metrics), (other, its_metrics) = (
+        updated(agent, satisfied(agent, each)) for each in (batch, changed)
+    )
+    assert metrics["agent/cloning_loss"] == its_metrics["agent/cloning_loss"]
+    for name in ("encoder.first.weight", "actor.policy.output.weight"):
+        np.testing.assert_array_equal(one.state()[name], other.state()[name])
+
+
+@pytest.mark.parametrize("critic_bias", [0.0, -7.0])
+def test_cloning_terms_by_hand(critic_bias: float) -> None:
+    """`cloning_weight * max(mean |Q|, 1)` times the cloning loss, for the actor and for the encoder."""
+    agent = cloning_agent(critic_bias)
+    batch = satisfied(agent, make_batch())
+    scale = max(float(batch.reward.abs().mean()), 1.0)  # the rewards are the critic's Q
+    assert (scale == 1.0) == (critic_bias == 0.0)
+    action = agent.actor(agent.encoder(batch.observation.float()))
+    loss = (action - batch.action)[:3].square().mean()
+    (gradient,) = torch.autograd.grad(loss, [agent.encoder.first.weight])
+
+    cloned, metrics = updated(agent, dataclasses.replace(batch, demonstrated=SHOWN))
+    _, without = updated(agent, batch)
+    assert float(metrics["agent/cloning_loss"]) == pytest.approx(loss.item(), rel=1e-5)
+    added = float(metrics["agent/actor_loss"]) - float(without["agent/actor_loss"])
+    assert added == pytest.approx(10 * scale * loss.item(), rel=1e-4)
+    # Adam's average after one step is a tenth of the gradient.
+    average = cloned.state()["critic_adam/exp_avg/encoder.first.weight"]
+    np.testing.assert_allclose(average, scale * gradient, rtol=1e-3, atol=1e-6)
 
 
 def test_target_critic_follows_slowly() -> None:
