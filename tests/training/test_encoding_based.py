@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from rich.console import Console
 from tiny_runs import ENCODING_BASED, new_run
 
+from bootifol.agents.drqv2 import DrQv2
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.registry import RewardConfig
@@ -17,7 +19,7 @@ from bootifol.training.api import evaluate_run
 from bootifol.training.components import build_agent, build_reward_model
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
-from bootifol.types import Video
+from bootifol.types import Action, Video
 
 SHORT = replace(
     ENCODING_BASED,
@@ -27,12 +29,25 @@ SHORT = replace(
 """A warm-up, a Cloning Phase, and an episode in which reward and agent learn."""
 
 
-def test_a_finished_run_is_evaluated_with_its_own_encoder(tmp_path: Path, demos: Path) -> None:
+def test_a_finished_run_is_evaluated_with_its_own_encoder(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run = new_run(tmp_path / "run", demos, config=SHORT)
     assert run.learn()
-    scores = run.finish()
-    again = evaluate_run(tmp_path / "run", SHORT.evaluation.final_episodes, seed=run.run.seed)
-    assert again.summary.mean == scores["evaluation/return_60"]
+    actions: list[Action] = []
+    act = DrQv2.act
+
+    def watched(*arguments: Any, **options: Any) -> Action:
+        actions.append(act(*arguments, **options))
+        return actions[-1]
+
+    monkeypatch.setattr(DrQv2, "act", watched)
+    run.finish()
+    finals = np.stack(actions)
+    actions.clear()
+    evaluate_run(tmp_path / "run", SHORT.evaluation.final_episodes, seed=run.run.seed)
+    assert len(np.unique(finals, axis=0)) > 10
+    np.testing.assert_array_equal(np.stack(actions), finals)
 
 
 def test_the_encoder_is_taught_by_the_reward_alone(tmp_path: Path, demos: Path) -> None:

@@ -1,15 +1,20 @@
-"""What a run measures of itself, and from which starts."""
+"""What a run measures of itself, how, and from which starts."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from tiny_runs import ENDS_SOON, new_run
 
+from bootifol.agents.drqv2 import DrQv2
 from bootifol.evaluation.returns import evaluation_seeds
 from bootifol.evaluation.tables import read_evaluations
+from bootifol.tracking import Tracker
+from bootifol.training.api import evaluate_run
 from bootifol.training.interactive import episode_seed
+from bootifol.types import Action, Observation
 
 TWO_ON_THE_WAY = replace(
     ENDS_SOON,
@@ -34,3 +39,27 @@ def test_every_evaluation_has_starts_of_its_own(tmp_path: Path, demos: Path) -> 
     every = [seed for seeds in starts.values() for seed in seeds]
     trained_from = {episode_seed(run.run.seed, episode) for episode in range(10)}
     assert len({*every} | trained_from) == len(every) + 10
+
+
+def test_what_is_measured_is_played_without_noise(
+    tmp_path: Path, demos: Path, finished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    explored: list[bool] = []
+    act = DrQv2.act
+
+    def watched(self: DrQv2, observation: Observation, agent_steps: float, explore: bool) -> Action:
+        explored.append(explore)
+        return act(self, observation, agent_steps, explore)
+
+    monkeypatch.setattr(DrQv2, "act", watched)
+    run = new_run(tmp_path / "run", demos, config=ENDS_SOON)
+    run.tracker = Tracker(run.directory, tensorboard=False)
+    for measure in (
+        run.measurements.returns_on_the_way,
+        run.measurements.final_returns,
+        run.measurements.showcase,
+        lambda: evaluate_run(finished, episodes=1),
+    ):
+        explored.clear()
+        measure()
+        assert explored and not any(explored)
