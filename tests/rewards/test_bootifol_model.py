@@ -160,6 +160,24 @@ def test_spoiled_share_of_the_others_is_drawn_from_the_expert() -> None:
         BootifolConfig(spoiled_share=1.0)
 
 
+def test_spoiled_videos_are_the_last_of_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = make(replace(SMALL, videos_per_class=4, spoiled_share=0.5, frame_drop=0.0))
+    learned_from: list[FrameBatch] = []
+    losses = model._losses
+    monkeypatch.setattr(
+        model, "_losses", lambda videos, drawn: learned_from.append(videos) or losses(videos, drawn)
+    )
+    next(model.align(EXPERT, OTHER))
+    experts, others = ({video.tobytes() for video in source.videos} for source in (EXPERT, OTHER))
+    origins = [
+        "expert" if video.tobytes() in experts else "other" if video.tobytes() in others else "spoiled"
+        for video in learned_from[0]
+    ]
+    assert origins == ["expert"] * 4 + ["other"] * 2 + ["spoiled"] * 2
+    frames_of_experts = {frame.tobytes() for video in EXPERT.videos for frame in video}
+    assert all(frame.tobytes() in frames_of_experts for video in learned_from[0][6:] for frame in video)
+
+
 def test_frames_per_video_leaves_the_sequence_losses_on_all_frames() -> None:
     few = next(make(replace(SMALL, frames_per_video=3, frame_drop=0.0)).align(EXPERT, OTHER))
     every = next(make(replace(SMALL, frame_drop=0.0)).align(EXPERT, OTHER))
