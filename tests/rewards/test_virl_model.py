@@ -119,6 +119,22 @@ def test_losses_are_those_of_videos_encoded_one_by_one() -> None:
     assert metrics["loss/sequence_reconstruction"] == pytest.approx(squares[1], rel=1e-4)
 
 
+def test_noisy_copies_have_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = make(replace(SMALL, altered_share=1.0, early_ends=False, frame_drop=0.0, noise=0.1))
+    encoded: list[torch.Tensor] = []
+    encode = model.networks.encode_frames
+    monkeypatch.setattr(
+        model.networks, "encode_frames", lambda pictures: encoded.append(pictures) or encode(pictures)
+    )
+    model.update(EXPERT, OTHER)
+    originals, copies = encoded[0].unflatten(0, (-1, FRAMES)).split([6, len(encoded[0]) // FRAMES - 6])
+    assert len(copies) > 0
+    for copy in copies:
+        noise = min((copy - original for original in originals), key=torch.Tensor.norm)
+        assert float(noise.std()) == pytest.approx(0.1, rel=0.05)
+        assert abs(float(noise.mean())) < 0.005
+
+
 def test_the_sequence_decoder_feeds_its_output_back() -> None:
     torch.manual_seed(0)
     decoder = SequenceDecoder()

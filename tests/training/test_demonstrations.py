@@ -222,6 +222,23 @@ def test_inverse_dynamics_prefers_steps_of_the_policy(
     assert (drawn[0][:32] < len(replay) - 30).any()
 
 
+def test_the_inverse_dynamics_sees_both_pictures_shifted_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    replay = ReplayBuffer(2000, SIZE, 1, stack=2, n_step=1, shift=4)
+    picture = np.random.default_rng(0).integers(0, 256, (SIZE, SIZE, 3), dtype=np.uint8)
+    still = np.stack([picture] * (STEPS + 1))
+    nothing = np.zeros((STEPS, 1), np.float32)
+    replay.add(Episode(still, nothing, Video("agent", still), False), nothing[:, 0])
+    demonstrations = make_demonstrations(CONFIG)
+    learned_from: list[Batch] = []
+    monkeypatch.setattr(
+        demonstrations.inverse_dynamics, "update", lambda batch, _: learned_from.append(batch) or {}
+    )
+    demonstrations.learn_inverse_dynamics(replay, 0, np.random.default_rng(0), 1e-3)
+    before, after = learned_from[0].observation, learned_from[0].next_observation
+    np.testing.assert_array_equal(before, after)
+    assert len(before.unique(dim=0)) > 5, "each pair has a shift of its own"
+
+
 def test_a_learning_rate_rises_and_falls_in_every_phase() -> None:
     shares = [one_cycle(done, 100) for done in range(100)]
     highest = int(np.argmax(shares))
