@@ -14,6 +14,17 @@ def test_summary_by_hand() -> None:
     assert summary.interquartile_mean == 3.5  # of 2, 3, 4, 5
 
 
+def test_both_intervals_by_hand() -> None:
+    sample = np.array([0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
+    summary = summarize(sample, confidence=0.9, resamples=400, seed=3)
+    drawn = [np.sort(sample[row]) for row in np.random.default_rng(3).integers(0, 8, (400, 8))]
+    for interval, means in (
+        (summary.interval, [row.mean() for row in drawn]),
+        (summary.interquartile_interval, [row[2:6].mean() for row in drawn]),
+    ):
+        assert interval == pytest.approx(tuple(np.quantile(means, [0.05, 0.95])))
+
+
 def covered(samples: Sequence[np.ndarray], truth: float) -> float:
     intervals = [summarize(sample, resamples=400).interval for sample in samples]
     return float(np.mean([i is not None and i[0] <= truth <= i[1] for i in intervals]))

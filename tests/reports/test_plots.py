@@ -3,7 +3,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
+from bootifol.evaluation.summary import summarize
 from bootifol.reports import plots
 from bootifol.reports.film_strip import (
     reward_above_film_strip,
@@ -72,6 +74,30 @@ def test_a_curve_shows_the_mean_of_the_episodes(run: RunFiles) -> None:
         steps, rows = list(run.evaluations_of(length).items())[7]
         returns = [row.scaled_return if scaled else row.environment_return for row in rows]
         assert drawn[7] == pytest.approx((steps, np.mean(returns)))
+
+
+def band_at(axes: Axes, when: float) -> tuple[float, float]:
+    """The lower and the upper end of the first band of a plot."""
+    corners = axes.collections[0].get_paths()[0].vertices
+    heights = corners[corners[:, 0] == when, 1]
+    return heights.min(), heights.max()
+
+
+def test_the_band_of_a_curve_is_the_interval_of_the_mean(run: RunFiles) -> None:
+    figure = plots.return_curves(plots.looks_of([run]), scaled=True)
+    assert figure is not None
+    for steps, rows in run.evaluations_of(500).items():
+        interval = summarize([row.scaled_return for row in rows], resamples=1000).interval
+        assert band_at(figure.axes[0], steps) == pytest.approx(interval)
+
+
+def test_the_band_of_a_loss_is_the_middle_of_its_bins(run: RunFiles) -> None:
+    curve = Curve(np.arange(1000.0), np.tile(np.arange(10.0), 100))
+    figure = plots.loss_curves(
+        plots.looks_of([replace(run, curves={("alignment", "loss/total"): curve})]), "loss/total"
+    )
+    assert figure is not None
+    assert band_at(figure.axes[0], 4.5) == pytest.approx((0.9, 8.1))  # of 0, 1 … 9, from 10 % to 90 %
 
 
 def test_nothing_to_draw_gives_no_figure(run: RunFiles) -> None:
