@@ -135,6 +135,7 @@ class Run:
         returns = self.measurements.final_returns()
         self.measurements.rank()
         self.measurements.showcase()
+        self.tracker.close()
         return returns
 
     def _align(self, interruption: Interruption) -> bool:
@@ -288,6 +289,7 @@ class Run:
 
     def _stop(self) -> bool:
         self._checkpoint()
+        self.tracker.close()
         self.console.print(f"stopped after a checkpoint. {self._how_to_resume()}")
         return False
 
