@@ -4,9 +4,10 @@ The plain versions (`benchmarks/plain`) are ordinary PyTorch in fp32; tests hold
 losses, gradients and rewards. *fp32* is our own code without bf16. Inputs are random, all sides get the same, and they
 are timed in turn, so that a busy machine slows all. Quote the ratios; absolute times belong to a machine. Markdown.
 
-The floor is what the machine could not beat: the plain version's arithmetic (matrix products and convolutions, as
-PyTorch counts them; its fused LSTM is not counted) at the rate of a large matrix product, plus the bytes that must
-move (pixels in, parameters and Adam's averages in and out) at the rate of a copy, both measured in the same run.
+The floor is what the machine could not beat: the arithmetic of that side which needs less (matrix products and
+convolutions, as PyTorch counts them; its fused LSTM is not counted) at the rate of a large matrix product, plus the
+bytes that must move (pixels in, parameters and Adam's averages in and out) at the rate of a copy, both measured in the
+same run.
 """
 
 from __future__ import annotations
@@ -272,7 +273,9 @@ def medians(works: Sequence[Work], runs: int, block: int) -> list[float]:
 
 @command()
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--threads", type=int, default=1, help="that PyTorch computes with (1)")
     parser.add_argument(
         "--runs", type=int, default=3, help="timed runs of the slow stages; quick ones get more"

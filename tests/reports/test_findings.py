@@ -10,6 +10,7 @@ import pytest
 from made_up_runs import write_run
 from synthetic_run import AGENT_STEPS, write_synthetic_run
 
+from bootifol.evaluation.tables import RankingRow, append_ranking
 from bootifol.reports.final_return import final_return
 from bootifol.reports.findings import Finding, findings, short_number
 from bootifol.reports.run_files import RunFiles, read_run
@@ -197,3 +198,16 @@ def test_without_an_expert_the_policy_stands_beside_random_actions(shared_run: P
 )
 def test_numbers_are_short(value: float, text: str) -> None:
     assert short_number(value) == text
+
+
+def test_without_half_good_videos_the_reward_is_judged_by_random_ones(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    write_synthetic_run(run)
+    (run / "ranking.csv").unlink()
+    for steps, below in ((0, 2), (900, 1)):
+        expert = [RankingRow(steps, "expert", f"e{n}", float(n)) for n in range(10)]
+        random = [RankingRow(steps, "random", f"r{n}", -1.0 if n >= below else 99.0) for n in range(10)]
+        append_ranking(run / "ranking.csv", [*expert, *random])
+    (told,) = [finding for finding in findings(read_run(run)) if "unseen expert" in finding.text]
+    assert "above a random one in 90% of pairs (a coin: 50%); before the agent acted it was 80%" in told.text
+    assert told.verdict == "fair"

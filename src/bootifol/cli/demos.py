@@ -85,7 +85,7 @@ def import_(
     behavior: Literal["expert", "half_good", "random"] = "expert",
     camera: str | None = None,
 ) -> int:
-    """Make a demo set from your own videos: mp4, mov, webm or gif files, folders of png or jpg pictures, .npy arrays.
+    """Make a demo set from your own videos: mp4, mov, webm, avi or gif files, folders of pictures, .npy arrays.
 
     A .npz archive may hold one such array among others. A LeRobot dataset of format v3 (its directory) gives one
     video an episode: its pictures alone, never its actions or states.

@@ -20,7 +20,7 @@ def score(
 
     Args:
         run: Directory that `bootifol train` wrote.
-        videos: Video files (mp4, webm, gif …), folders of frames, .npy files, or demo sets.
+        videos: Video files (mp4, webm, gif …), folders of frames, .npy files, LeRobot datasets, or demo sets.
         out: CSV file to write the reward of every step to: columns video, step, reward.
         picture: PNG file to draw the reward of every step to, above the film strips of the first six videos.
     """

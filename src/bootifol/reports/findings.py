@@ -9,7 +9,7 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from bootifol.errors import BootifolError
-from bootifol.evaluation.ranking import RankingScores, ranking_scores
+from bootifol.evaluation.ranking import RankingScores, expert_above_random, ranking_scores
 from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import EvaluationRow, RankingRow
 from bootifol.reports.final_return import FinalReturn, final_return
@@ -109,7 +109,7 @@ def _reward(run: RunFiles) -> Finding | None:
     scored = [(steps, scores_or_none(rows)) for steps, rows in run.ranking_moments().items()]
     known = [(steps, scores) for steps, scores in scored if scores is not None]
     if not known:
-        return None
+        return _reward_without_half_good(run)
     steps, last = known[-1]
     text = (
         f"The reward puts an unseen expert video above a half-good one in {last.expert_above_half_good:.0%} of "
@@ -121,6 +121,22 @@ def _reward(run: RunFiles) -> Finding | None:
         text += f"; before the agent acted it was {before}"
     weakest = min(last.expert_above_half_good, last.half_good_above_random)
     return Finding(_verdict(weakest, good=0.8, fair=0.6), text + ".")
+
+
+def _reward_without_half_good(run: RunFiles) -> Finding | None:
+    """All that imported videos can tell: nobody filmed a performer that is half as good."""
+    shares = [
+        expert_above_random(rows)
+        for rows in run.ranking_moments().values()
+        if {"expert", "random"} <= {row.kind for row in rows}
+    ]
+    if not shares:
+        return None
+    text = f"The reward puts an unseen expert video above a random one in {shares[-1]:.0%} of pairs (a coin: 50%)"
+    if len(shares) > 1:
+        text += f"; before the agent acted it was {shares[0]:.0%}"
+    text += ". Without half-good videos nothing tells how it ranks what comes between."
+    return Finding(_verdict(shares[-1], good=0.95, fair=0.8), text)
 
 
 def _cloning(run: RunFiles) -> Finding | None:
