@@ -144,7 +144,8 @@ def reward_stages(run: Run, expert: VideoSource, agent_videos: VideoSource) -> I
     if updates:
         yield Stage("gradient step of the reward", updates, lambda: model.update(expert, agent_videos))
         if config.interactive.relabel_episodes:
-            yield Stage("renewing stored rewards", updates, interactive._renew_rewards)
+            renewed = updates * config.interactive.relabel_episodes
+            yield Stage("renewing a stored episode's rewards", renewed, interactive._relabel_one)
     video, numbers = parts.agent_videos[0], itertools.count()
     if parts.backbone is not None:
         backbone, size = parts.backbone, config.pictures.video_size

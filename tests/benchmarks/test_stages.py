@@ -51,7 +51,7 @@ def test_how_often_a_stage_happens_follows_from_the_configuration(demos: Path, t
         "batch from replay": 18,
         "update of the agent": 18,
         "gradient step of the reward": 4,  # (160 - 60) / 25
-        "renewing stored rewards": 4,
+        "renewing a stored episode's rewards": 12,
         "rewarding an episode while the reward learns": 160 / 30,
         "rewarding an episode when it rests": 80 / 30,
         "evaluation on the way": 2 + 2,  # and one after each of the Cloning Phases, at 60 and 150

@@ -112,37 +112,6 @@ def test_actions_and_rewards_of_the_videos_are_inferred() -> None:
     np.testing.assert_array_equal(everything.reward.numpy().reshape(6, STEPS)[:, 0], np.arange(6))
 
 
-class ComparingReward(CountingReward):
-    """Rewards a video with how many others it is compared with, and NaN where it is among them."""
-
-    reference_count = 3
-
-    def label(self, video: Video, references: Sequence[Video]) -> np.ndarray:
-        itself = any(reference.name == video.name for reference in references)
-        return np.full(STEPS, np.nan if itself else len(references), np.float32)
-
-
-def rewards_of(demonstrations: Demonstrations) -> np.ndarray:
-    stored = demonstrations.replay.state()["rewards"].reshape(6, STEPS + 1)
-    return stored[:, :STEPS]
-
-
-def test_no_video_is_compared_with_itself() -> None:
-    demonstrations, rng = make_demonstrations(CONFIG), np.random.default_rng(0)
-    for _ in range(20):
-        for index in range(6):
-            demonstrations.infer(index, ComparingReward(), rng)
-        assert (rewards_of(demonstrations) == 3).all()
-    references = [demonstrations.expert[index] for index in range(3)]
-    for index in range(6):
-        demonstrations.reward_anew(index, ComparingReward(), references)
-    np.testing.assert_array_equal(rewards_of(demonstrations)[:, 0], [2, 2, 2, 3, 3, 3])
-    demonstrations.reward_anew(5, ComparingReward(), [demonstrations.expert[5]])
-    assert (rewards_of(demonstrations)[5] == 3).all(), "beside nothing but itself it keeps its rewards"
-    demonstrations.reward_anew(5, CountingReward(), [])
-    assert (rewards_of(demonstrations)[5] == 5).all(), "a method without references needs none"
-
-
 @pytest.mark.parametrize(("moving_share", "expected"), [(0.75, 0.75), (1.0, 1.0), (0.0, 0.0)])
 def test_transitions_are_drawn_by_movement(moving_share: float, expected: float) -> None:
     demonstrations = make_demonstrations(replace(CONFIG, moving_share=moving_share, history_dropout=0.0))

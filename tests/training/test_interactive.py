@@ -11,7 +11,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from tiny_runs import TINY, WITH_DEMONSTRATIONS, new_run
+from tiny_runs import TINY, new_run
 
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.rewards.registry import METHODS
@@ -73,19 +73,6 @@ def test_rewards_of_episodes_that_ended_early_are_renewed_at_their_own_length(
         run.interactive.play_episode()
     replay = run.components.replay
     assert {replay.agent_steps_of(episode) for episode in replay.episode_ids} == {4, 5, 6, 7, 8, 9}
-
-
-def test_demonstrations_follow_the_reward_too(
-    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run = new_run(tmp_path / "run", demos, config=WITH_DEMONSTRATIONS)
-    renewed_at: list[int] = []
-    assert run.components.demonstrations is not None
-    monkeypatch.setattr(
-        run.components.demonstrations, "reward_anew", lambda *_: renewed_at.append(run.counters.agent_steps)
-    )
-    assert run.learn()
-    assert renewed_at == [80, 120, 160, 200], "one each time the reward learns, as of the agent's episodes"
 
 
 class KnownReward:

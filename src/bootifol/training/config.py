@@ -55,8 +55,8 @@ class InteractiveConfig:
     that learns to tell them from the expert's spoils the policy."""
 
     relabel_episodes: int = 0
-    """Stored episodes rewarded anew after each update of the reward, drawn at random among those still in replay, and
-    as many demonstrations; 0 as in the paper, whose stored rewards go stale."""
+    """Stored episodes rewarded anew after each update of the reward, drawn at random among those still in replay; 0 as
+    in the paper, whose stored rewards go stale."""
 
     log_every: int = 1000
     """Agent steps a line of metrics averages over."""

@@ -12,7 +12,6 @@ most of them are drawn from where the picture moves ("copycat" policies: Wen et 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -150,23 +149,9 @@ class Demonstrations:
     def infer(self, index: int, reward_model: RewardModel, rng: np.random.Generator) -> None:
         """Gives a video the actions and rewards that inverse dynamics and reward model now see in it."""
         video = self.expert[index]
-        references = draw_references(reward_model, self.expert, rng, excluded=index)
+        rewards = reward_model.label(video, draw_references(reward_model, self.expert, rng))
         actions = self.inverse_dynamics.actions(self._at_agent_size(video))
-        self.replay.relabel(self.replay.episode_ids[index], reward_model.label(video, references), actions)
-
-    def reward_anew(self, index: int, reward_model: RewardModel, references: Sequence[Video]) -> None:
-        """Gives a video the rewards that the reward model now sees in it.
-
-        Args:
-            index: of the video.
-            reward_model: the one that learns.
-            references: what it is compared with; not with itself, beside which it would be perfect.
-        """
-        video = self.expert[index]
-        others = [reference for reference in references if reference.name != video.name]
-        if references and not others:
-            return
-        self.replay.relabel(self.replay.episode_ids[index], reward_model.label(video, others))
+        self.replay.relabel(self.replay.episode_ids[index], rewards, actions)
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
         """Transitions of the expert videos, most of them where the picture moves."""

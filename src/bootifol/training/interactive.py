@@ -25,7 +25,7 @@ from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.cloning import cloning_due
 from bootifol.training.config import InteractiveConfig
 from bootifol.training.demonstrations import Demonstrations
-from bootifol.types import Action, Batch, Observation, Video, VideoSource
+from bootifol.types import Action, Batch, Observation, VideoSource
 
 
 @dataclass
@@ -135,26 +135,17 @@ class InteractivePhase:
         if self.reward_model.version == version:
             return  # nothing was learned, so no stored reward is stale
         self.counters.reward_updates += 1
-        self._renew_rewards()
-
-    def _renew_rewards(self) -> None:
-        """Rewards a few stored episodes anew, and as many demonstrations, so that batches follow the reward."""
-        if not self.config.relabel_episodes:
-            return
-        # The same for all of them: encoding references costs more than encoding what is compared with them.
-        references = draw_references(self.reward_model, self.expert, self.rng)
         for _ in range(self.config.relabel_episodes):
-            self._relabel_episode(references)
-            if self.demonstrations is not None:
-                index = int(self.rng.integers(len(self.demonstrations)))
-                self.demonstrations.reward_anew(index, self.reward_model, references)
+            self._relabel_one()
 
-    def _relabel_episode(self, references: list[Video]) -> None:
+    def _relabel_one(self) -> None:
+        """Rewards a stored episode anew, so that replay follows the reward as it learns."""
         ids = self.replay.episode_ids
         kept = range(max(ids.start, ids.stop - len(self.agent_videos)), ids.stop)
         episode_id = int(self.rng.integers(kept.start, kept.stop))
         slot = episode_id % self.config.agent_videos
         video = self.agent_videos[slot]
+        references = draw_references(self.reward_model, self.expert, self.rng)
         # An episode that ended early stands still in the ring up to the full length; no reward looks ahead at that.
         rewards = self.reward_model.label(video, references)[: self.replay.agent_steps_of(episode_id)]
         self.replay.relabel(episode_id, rewards)
