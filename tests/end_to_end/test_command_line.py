@@ -243,7 +243,7 @@ def test_help_breaks_lines_where_the_terminal_ends_and_not_where_a_docstring_doe
             main(["train", "--help"])
         printed = " ".join(capsys.readouterr().out.replace("│", " ").split())
         assert "cuda:NUMBER, or mps on a Mac. None but the CPU has been tried. (default: auto)" in printed
-        assert "drawn at random among those still in replay, and" in printed, "a setting of a setting"
+        assert "among those still in replay; 0 as in the paper, whose" in printed, "a setting of a setting"
 
 
 @pytest.mark.parametrize(
