@@ -231,8 +231,8 @@ def test_what_lies_beside_checkpoints_is_left_alone_but_what_a_killed_process_wr
     [
         "[]",
         "{}",
-        '{"format": 1}',
-        '{"format": 1, "counters": {"hops": 1}, "random_state": {}, "metrics_bytes": 0}',
+        '{"format": 2}',
+        '{"format": 2, "counters": {"hops": 1}, "random_state": {}, "metrics_bytes": 0}',
     ],
 )
 def test_a_damaged_index_of_a_checkpoint_is_named(tmp_path: Path, demos: Path, index: str) -> None:
@@ -241,6 +241,15 @@ def test_a_damaged_index_of_a_checkpoint_is_named(tmp_path: Path, demos: Path, i
     assert newest is not None
     (newest / "checkpoint.json").write_text(index)
     with pytest.raises(BootifolError, match="is damaged or of another version of bootifol"):
+        resumed(tmp_path / "run")
+
+
+def test_a_checkpoint_of_an_older_format_is_told_so(tmp_path: Path, demos: Path) -> None:
+    assert new_run(tmp_path / "run", demos, config=ENDS_SOON).learn()
+    newest = newest_checkpoint(tmp_path / "run" / "checkpoints")
+    assert newest is not None
+    (newest / "checkpoint.json").write_text('{"format": 1, "counters": {"inferred_videos": 1}}')
+    with pytest.raises(BootifolError, match="was written in checkpoint format 1, this version reads 2"):
         resumed(tmp_path / "run")
 
 

@@ -97,19 +97,18 @@ def load_checkpoint(checkpoint: Path, components: Mapping[str, Stateful]) -> Pro
         BootifolError: a file is missing, truncated or does not fit the configuration.
     """
     meta = read_json(checkpoint / "checkpoint.json", "the checkpoint's index")
+    if isinstance(meta, dict) and meta.get("format", FORMAT) != FORMAT:
+        raise BootifolError(
+            f"{checkpoint} was written in checkpoint format {meta['format']}, this version reads {FORMAT}; "
+            "resume it with the version named in the run's config.json"
+        )
     try:
-        written = meta["format"]
         progress = Progress(Counters(**meta["counters"]), meta["random_state"], meta["metrics_bytes"])
     except (KeyError, TypeError) as error:
         raise BootifolError(
             f"{checkpoint / 'checkpoint.json'} is damaged or of another version of bootifol: {error}; resume with the "
             "version named in the run's config.json"
         ) from error
-    if written != FORMAT:
-        raise BootifolError(
-            f"{checkpoint} was written in checkpoint format {written}, this version reads {FORMAT}; "
-            "resume it with the version named in the run's config.json"
-        )
     for name, component in components.items():
         arrays = read_arrays(checkpoint / f"{name}.safetensors", f"the checkpoint's {name}")
         try:
