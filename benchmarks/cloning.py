@@ -105,7 +105,9 @@ def cloned(
     size, stack, steps = config.pictures.agent_size, config.pictures.stack, episodes[0].agent_steps
     action_dim = episodes[0].actions.shape[1]
     agent = DrQv2(config.agent, size, stack, action_dim, arguments.seed)
-    replay = ReplayBuffer(len(episodes) * (steps + 1), size, action_dim, stack, shift=config.agent.shift)
+    replay = ReplayBuffer(
+        len(episodes) * (steps + 1), size, action_dim, stack, shift=config.agent.random_shift
+    )
     demonstrations = Demonstrations(
         DemonstrationConfig(
             share=0.5, videos=len(episodes), moving_share=moving_share or 0.0, history_dropout=history_dropout

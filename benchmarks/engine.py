@@ -151,8 +151,10 @@ def agent_update(config: TrainingConfig) -> Stage:
 
     def plain_update() -> None:
         noise = 0.5 * torch.randn(2, batch_size, ACTION_DIM)
-        shifts = torch.randint(-agent_config.shift, agent_config.shift + 1, (2, batch_size, 2))
-        plain.update(plain_replay.sample(batch_size, rng), noise[0], noise[1], shifts, agent_config.shift)
+        shifts = torch.randint(-agent_config.random_shift, agent_config.random_shift + 1, (2, batch_size, 2))
+        plain.update(
+            plain_replay.sample(batch_size, rng), noise[0], noise[1], shifts, agent_config.random_shift
+        )
 
     trained = count_parameters(agent.encoder, agent.actor, agent.critic)
     pixels = 2 * batch_size * 3 * stack * size**2

@@ -34,7 +34,7 @@ AGENT = DrQv2Config(
     feature_dim=8,
     hidden_dim=16,
     precision="fp32",
-    averaging=0.9,
+    ema_decay=0.9,
     cloning_weight=1.0,
     saturation_weight=0.1,
 )

@@ -169,7 +169,7 @@ class PlainDrQv2:
         hidden: int = 1024,
         convolutions: Sequence[tuple[int, int, int]] = PAPER_CONVOLUTIONS,
         learning_rate: float = 1e-4,
-        target_rate: float = 0.01,
+        tau: float = 0.01,
         noise_clip: float = 0.3,
     ) -> None:
         self.encoder = PlainEncoder(3 * stack, frame_size, convolutions)
@@ -178,7 +178,7 @@ class PlainDrQv2:
         self.actor = PlainActor(*sizes)
         self.critic = PlainCritic(*sizes)
         self.target_critic = copy.deepcopy(self.critic)
-        self.target_rate = target_rate
+        self.tau = tau
         self.noise_clip = noise_clip
         self.encoder_optimizer = torch.optim.Adam(self.encoder.parameters(), learning_rate)
         self.actor_optimizer = torch.optim.Adam(self.actor.parameters(), learning_rate)
@@ -222,5 +222,5 @@ class PlainDrQv2:
 
         with torch.no_grad():
             for slow, fast in zip(self.target_critic.parameters(), self.critic.parameters(), strict=True):
-                slow.copy_(self.target_rate * fast + (1 - self.target_rate) * slow)
+                slow.copy_(self.tau * fast + (1 - self.tau) * slow)
         return {"critic_loss": critic_loss.item(), "actor_loss": actor_loss.item()}

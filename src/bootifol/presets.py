@@ -72,7 +72,7 @@ CPU = TrainingConfig(
         exploration_steps=6000,
         saturation_weight=0.01,
         cloning_weight=10.0,
-        averaging=0.999,
+        ema_decay=0.999,
         replay_capacity=40_000,
         precision="bf16",
     ),
@@ -93,7 +93,7 @@ CPU = TrainingConfig(
 
 Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
 `motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `relabel_episodes`, by which stored
-rewards follow it, `saturation_weight`, `averaging` and `cloning_weight` of the agent, `demonstrations`, by which the
+rewards follow it, `saturation_weight`, `ema_decay` and `cloning_weight` of the agent, `demonstrations`, by which the
 policy starts as a clone of the videos, and `augmentation` where these come from files; each is described at its field.
 """
 
@@ -138,11 +138,11 @@ DRAWN = replace(
         replay_capacity=10_000,
         learning_rate=5e-4,
         discount=0.9,
-        target_rate=0.02,
-        shift=2,
+        tau=0.02,
+        random_shift=2,
         saturation_weight=0.1,
         cloning_weight=0.0,
-        averaging=0.0,
+        ema_decay=0.0,
     ),
     demonstrations=DemonstrationConfig(),
     alignment=AlignmentConfig(gradient_steps=150, time_share=0.25, log_every=10),

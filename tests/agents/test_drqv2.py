@@ -325,7 +325,7 @@ def test_cloning_terms_by_hand(critic_bias: float) -> None:
 
 
 def test_target_critic_follows_slowly() -> None:
-    agent = make_agent(dataclasses.replace(SMALL, target_rate=0.25))
+    agent = make_agent(dataclasses.replace(SMALL, tau=0.25))
     agent.update(make_batch(0), 0)
     before = agent.state()
     agent.update(make_batch(1), 0)
@@ -336,7 +336,7 @@ def test_target_critic_follows_slowly() -> None:
 
 
 def test_the_averaged_policy_follows_slowly_and_acts_without_exploration() -> None:
-    agent = make_agent(dataclasses.replace(SMALL, averaging=0.75))
+    agent = make_agent(dataclasses.replace(SMALL, ema_decay=0.75))
     newest = make_agent(SMALL)
     states = [agent.state()]
     for _ in range(6):
@@ -359,10 +359,10 @@ def test_the_averaged_policy_follows_slowly_and_acts_without_exploration() -> No
     assert not np.array_equal(*other)
 
 
-@pytest.mark.parametrize("averaging", [0.0, 0.9])
+@pytest.mark.parametrize("ema_decay", [0.0, 0.9])
 @pytest.mark.parametrize("precision", ["bf16", "fp32"])
-def test_state_is_exact(tmp_path, precision, averaging) -> None:
-    config = dataclasses.replace(SMALL, precision=precision, averaging=averaging)
+def test_state_is_exact(tmp_path, precision, ema_decay) -> None:
+    config = dataclasses.replace(SMALL, precision=precision, ema_decay=ema_decay)
     agent = make_agent(config)
     for i in range(2):
         agent.clone(make_batch(i), 1e-3)

@@ -25,7 +25,7 @@ from bootifol.types import Action, Observation
 
 PICTURES = PictureConfig(agent_size=24, video_size=32)
 CONFIG = PolicyConfig("drawn_reach", 120, 2, action_repeat=2, frames_per_second=5.0, pictures=PICTURES)
-AGENT = DrQv2Config(encoder="strided", feature_dim=8, hidden_dim=16, averaging=0.9)
+AGENT = DrQv2Config(encoder="strided", feature_dim=8, hidden_dim=16, ema_decay=0.9)
 
 
 class WideReach(gymnasium.Env[Any, Any]):
@@ -119,10 +119,10 @@ def test_pictures_of_the_agents_size_are_taken_as_they_are() -> None:
 
 
 @pytest.mark.parametrize("encoder", ["paper", "strided", "coarse"])
-@pytest.mark.parametrize("averaging", [0.0, 0.9])
-def test_a_file_acts_as_the_agent_bit_for_bit(tmp_path: Path, encoder: Any, averaging: float) -> None:
+@pytest.mark.parametrize("ema_decay", [0.0, 0.9])
+def test_a_file_acts_as_the_agent_bit_for_bit(tmp_path: Path, encoder: Any, ema_decay: float) -> None:
     pictures = replace(PICTURES, agent_size=36)
-    trained = DrQv2(replace(AGENT, encoder=encoder, averaging=averaging), 36, 3, action_dim=2, seed=3)
+    trained = DrQv2(replace(AGENT, encoder=encoder, ema_decay=ema_decay), 36, 3, action_dim=2, seed=3)
     write_policy(tmp_path / "policy.safetensors", replace(CONFIG, pictures=pictures), trained)
     state = torch.random.get_rng_state()
     policy = read_policy(tmp_path / "policy.safetensors")

@@ -110,7 +110,7 @@ def test_the_paper_preset_is_the_papers_table() -> None:
         50,
     )
     assert (agent.exploration_start, agent.exploration_end, agent.exploration_steps) == (1.0, 0.1, 500_000)
-    assert (agent.noise_clip, agent.target_rate, agent.update_every, agent.shift) == (0.3, 0.01, 2, 4)
+    assert (agent.noise_clip, agent.tau, agent.update_every, agent.random_shift) == (0.3, 0.01, 2, 4)
     assert (agent.replay_capacity, agent.warm_up_steps) == (100_000, 1920)
     assert paper.demonstrations.share == 0 and agent.cloning_weight == 0
 

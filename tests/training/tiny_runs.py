@@ -77,7 +77,7 @@ ENCODING_BASED = replace(
 
 ENDS_SOON = replace(
     TINY,
-    agent=replace(TINY.agent, averaging=0.9, warm_up_steps=30),
+    agent=replace(TINY.agent, ema_decay=0.9, warm_up_steps=30),
     interactive=replace(TINY.interactive, agent_steps=90),
 )
 """A policy with averaged networks after a few updates."""

@@ -55,7 +55,7 @@ class DrQv2Config:
     learning_rate: float = 1e-4
     """Of Adam, for encoder, critic and actor."""
 
-    target_rate: float = 0.01
+    tau: float = 0.01
     """How far the target critic moves to the critic at each update (tau)."""
 
     exploration_start: float = 1.0
@@ -80,7 +80,7 @@ class DrQv2Config:
     replay_capacity: int = 100_000
     """Frames that replay holds; an episode of T transitions takes T + 1."""
 
-    shift: int = 4
+    random_shift: int = 4
     """Largest random shift of the pictures in pixels."""
 
     saturation_weight: float = 0.0
@@ -91,10 +91,10 @@ class DrQv2Config:
     """Beyond the paper: how strongly actor and encoder are pulled to the inferred actions of expert videos, relative
     to the mean of |Q| or 1, whichever is larger; 0, as in the paper, not at all. Needs `demonstrations`."""
 
-    averaging: float = 0.0
+    ema_decay: float = 0.0
     """Beyond DrQ-v2: without exploration the policy acts with running averages of encoder and actor, which keep this
     share of themselves at each update and so even out the noise of the last ones; 0, as in its paper, the newest.
-    Until 1 / (1 - averaging) updates they are plain means, in which nothing is left of the initial parameters."""
+    Until 1 / (1 - ema_decay) updates they are plain means, in which nothing is left of the initial parameters."""
 
     precision: Precision = "fp32"
     """Arithmetic of convolutions and matrix products, also of the inverse dynamics; parameters, losses and Q values are
@@ -112,10 +112,10 @@ class DrQv2Config:
             "noise_clip",
             "warm_up_steps",
         )
-        require_at_least(0, **of_self(*exploration, "saturation_weight", "cloning_weight", "shift"))
+        require_at_least(0, **of_self(*exploration, "saturation_weight", "cloning_weight", "random_shift"))
         require_positive(**of_self("learning_rate"))
-        require_share(**of_self("discount", "target_rate"))
-        require_below_one(**of_self("averaging"))
+        require_share(**of_self("discount", "tau"))
+        require_below_one(**of_self("ema_decay"))
 
     def exploration(self, agent_steps: float) -> float:
         """Standard deviation of the noise after so many agent steps."""

@@ -117,7 +117,7 @@ class DrQv2:
         self.target_critic.requires_grad_(False)
         self._averages = 0
         self._averaged: tuple[Encoder | EncodingEncoder, Actor] | None = None
-        if config.averaging > 0:
+        if config.ema_decay > 0:
             self._averaged = copy.deepcopy(self.encoder), copy.deepcopy(self.actor)
         self._generator = torch.Generator().manual_seed(int(start.initial_seed()) + 1)
         self._critic_optimizer = torch.optim.Adam(
@@ -243,7 +243,7 @@ class DrQv2:
 
         with torch.no_grad():
             torch._foreach_lerp_(
-                list(self.target_critic.parameters()), list(self.critic.parameters()), self.config.target_rate
+                list(self.target_critic.parameters()), list(self.critic.parameters()), self.config.tau
             )
         self._average()
         return metrics | {
@@ -261,7 +261,7 @@ class DrQv2:
             return
         self._averages += 1
         # The mean at first, so that nothing is left of the initial parameters.
-        weight = max(1.0 - self.config.averaging, 1.0 / self._averages)
+        weight = max(1.0 - self.config.ema_decay, 1.0 / self._averages)
         with torch.no_grad():
             for average, newest in zip(self._averaged, (self.encoder, self.actor), strict=True):
                 torch._foreach_lerp_(list(average.parameters()), list(newest.parameters()), weight)

@@ -147,7 +147,7 @@ def _encodings(run: RunConfig, reward_model: RewardModel | None) -> FrameEncodin
 
 def _shift(run: RunConfig) -> int:
     """Of the pictures that replay gives out; encodings are of whole pictures."""
-    return 0 if sees_encodings(run) else run.training.agent.shift
+    return 0 if sees_encodings(run) else run.training.agent.random_shift
 
 
 def demonstrated_videos(run: RunConfig, expert: VideoSource) -> int:
