@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 from bootifol import tasks as catalogue
 from bootifol.cli import doctor as doctor_command
@@ -33,6 +34,9 @@ def test_doctor_shows_versions_machine_and_render_profiles(capsys: pytest.Captur
         "memory",
         "device auto means",
         "bf16 against fp32",
+        "ms an update of the agent",
+        "ms a gradient step of the reward",
+        "one run on this machine: --threads",
         "fast",
         "balanced",
         "full",
@@ -55,6 +59,25 @@ def test_doctor_says_where_training_would_compute(
     assert dict(doctor_command.machine())["device auto means"] == said
 
 
+@pytest.mark.parametrize(("cores", "tried"), [(1, [1]), (2, [1, 2]), (6, [1, 2, 4, 6]), (8, [1, 2, 4, 8])])
+def test_doctor_tries_powers_of_two_and_all_cores(cores: int, tried: list[int]) -> None:
+    assert doctor_command.thread_counts(cores) == tried
+
+
+def test_doctor_times_learning_and_leaves_the_threads_as_they_were() -> None:
+    before = torch.get_num_threads()
+    measured = doctor_command.milliseconds_by_threads([1])
+    assert torch.get_num_threads() == before
+    update, reward_step = measured[1]
+    assert 0 < update < reward_step, "a gradient step of the reward reads sixteen whole videos"
+
+
+def test_doctor_advises_the_fewest_threads_that_are_nearly_the_quickest() -> None:
+    measured = {1: (100.0, 9.0), 2: (54.0, 5.0), 4: (50.0, 1.0), 8: (80.0, 1.0)}
+    assert doctor_command.advised_threads(measured) == 2
+    assert doctor_command.advised_threads({1: (100.0, 9.0)}) == 1
+
+
 @pytest.mark.usefixtures("requires_rendering")
 def test_doctor_exits_with_2_and_a_sentence_when_nothing_renders(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -63,6 +86,7 @@ def test_doctor_exits_with_2_and_a_sentence_when_nothing_renders(
         raise RuntimeError("no display")
 
     monkeypatch.setattr(camera, "_context_class", no_context)
+    monkeypatch.setattr(doctor_command, "milliseconds_by_threads", lambda counts: {1: (50.0, 300.0)})
     assert main(["doctor"]) == 2
     captured = capsys.readouterr()
     assert "bf16" in captured.out, "what could be measured is shown all the same"
@@ -117,6 +141,7 @@ def test_doctor_sees_a_driver_that_paints_nothing(
         return environment
 
     monkeypatch.setattr(doctor_command, "make_environment", drawn_black)
+    monkeypatch.setattr(doctor_command, "milliseconds_by_threads", lambda counts: {1: (50.0, 300.0)})
     assert main(["doctor"]) == 2
     assert "every pixel is the same" in capsys.readouterr().err
 

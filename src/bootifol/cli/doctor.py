@@ -24,6 +24,9 @@ from bootifol.tasks import make_environment
 _TASK = "reacher_hard"
 _PICTURE_SIZE = 64
 _STEPS = 12
+_FRAMES = 61
+_ACTION_DIM = 2
+_TURNS = 2
 _MATRIX_SIZE = 512
 _DRAWN: dict[RenderProfile, str] = {
     "fast": "no shadows, no reflections; smoothed by averaging",
@@ -33,7 +36,7 @@ _DRAWN: dict[RenderProfile, str] = {
 
 
 def doctor() -> int:
-    """Say whether this machine can train: versions, cores, memory, speed of bf16, and of rendering.
+    """Say whether this machine can train: versions, cores, memory, speed of bf16, of learning by threads, of rendering.
 
     Exits with 0 when it can, and with 2 and what to install when something is missing.
     """
@@ -55,6 +58,21 @@ def doctor() -> int:
     for what, measured in machine():
         table.add_row(what, measured)
     console.print(table)
+
+    table = Table(
+        "--threads",
+        "ms an update of the agent",
+        "ms a gradient step of the reward",
+        title="Learning with the preset cpu",
+        title_justify="left",
+    )
+    by_threads = milliseconds_by_threads(thread_counts(_cores()))
+    for threads, (update, reward_step) in by_threads.items():
+        table.add_row(str(threads), f"{update:.0f}", f"{reward_step:.0f}")
+    console.print(table)
+    console.print(
+        f"one run on this machine: --threads {advised_threads(by_threads)}; several at once: --threads 1\n"
+    )
 
     table = Table(
         "render profile",
@@ -117,6 +135,62 @@ def bf16_speed() -> float:
     fp32 = torch.randn(_MATRIX_SIZE, _MATRIX_SIZE)
     bf16 = fp32.to(torch.bfloat16)
     return _seconds(lambda: fp32 @ fp32) / _seconds(lambda: bf16 @ bf16)
+
+
+def thread_counts(cores: int) -> list[int]:
+    """1, 2, 4 and so on, and all cores."""
+    return sorted({2**power for power in range(cores.bit_length()) if 2**power <= cores} | {cores})
+
+
+def advised_threads(measured: dict[int, tuple[float, float]]) -> int:
+    """The fewest threads with which an update of the agent takes at most a tenth longer than at best.
+
+    Args:
+        measured: milliseconds of an update of the agent and of a gradient step of the reward, by threads.
+    """
+    quickest = min(update for update, _ in measured.values())
+    return min(threads for threads, (update, _) in measured.items() if update <= 1.1 * quickest)
+
+
+def milliseconds_by_threads(counts: list[int]) -> dict[int, tuple[float, float]]:
+    """Time of an update of the agent and of a gradient step of the reward on the CPU, with the preset `cpu`.
+
+    Args:
+        counts: of the threads to try. They take turns, so that other work on the machine slows all alike.
+    """
+    import torch
+
+    from bootifol.agents.drqv2 import DrQv2
+    from bootifol.demos.agent_videos import AgentVideos
+    from bootifol.presets import CPU
+    from bootifol.rewards.bootifol.model import BootifolRewardModel
+    from bootifol.types import Batch, Video
+
+    pictures, batch_size = CPU.pictures, CPU.agent.batch_size
+    agent = DrQv2(CPU.agent, pictures.agent_size, pictures.stack, _ACTION_DIM, seed=0)
+    reward = BootifolRewardModel(CPU.reward.bootifol, pictures.video_size, seed=0)
+    rng = np.random.default_rng(0)
+    shape = (batch_size, pictures.agent_size, pictures.agent_size, 3 * pictures.stack)
+    seen, seen_next = (
+        torch.from_numpy(rng.integers(0, 256, shape, dtype=np.uint8)).permute(0, 3, 1, 2) for _ in range(2)
+    )
+    rewards = torch.zeros(batch_size)
+    batch = Batch(seen, torch.zeros(batch_size, _ACTION_DIM), rewards, rewards, seen_next)
+    size, count = pictures.video_size, CPU.reward.bootifol.videos_per_class
+    videos = AgentVideos(count, _FRAMES, size)
+    for index in range(count):
+        videos.add(Video(str(index), rng.integers(0, 256, (_FRAMES, size, size, 3), dtype=np.uint8)))
+    works = (lambda: agent.update(batch, 0.0), lambda: reward.update(videos, videos))
+    before = torch.get_num_threads()
+    times: dict[int, list[list[float]]] = {threads: [[] for _ in works] for threads in counts}
+    try:
+        for threads in counts * _TURNS:
+            torch.set_num_threads(threads)
+            for work, taken in zip(works, times[threads], strict=True):
+                taken.append(1000.0 * _seconds(work, repetitions=1))
+    finally:
+        torch.set_num_threads(before)
+    return {threads: (min(update), min(step)) for threads, (update, step) in times.items()}
 
 
 def milliseconds_per_step(profile: RenderProfile) -> float:
