@@ -270,6 +270,15 @@ def remedies(config: TrainingConfig, timed: bool) -> list[System]:
     ]
 
 
+def precisions(config: TrainingConfig, timed: bool) -> list[System]:
+    """Networks that compute in bf16, as small presets do, and in fp32."""
+    both = ("agent.precision", "reward.bootifol.precision")
+    return [
+        System("bootifol", precision, tuple((field, precision) for field in both))
+        for precision in ("bf16", "fp32")
+    ]
+
+
 SMALL: Overrides = (
     ("pictures.agent_size", 32),
     ("pictures.video_size", 32),
@@ -396,6 +405,13 @@ SUITES = {
         ("drawn_home",),
         THREE_SEEDS,
         remedies,
+    ),
+    "precision": Suite(
+        "what bf16 does to returns: agent and reward in bf16, and in fp32",
+        "drawn",
+        ("drawn_home",),
+        FIVE_SEEDS,
+        precisions,
     ),
     "smoke": Suite("three runs of seconds, which learn nothing", "smoke", ("drawn_home",), (1,), smallest),
 }

@@ -56,7 +56,17 @@ def parsed(words: list[str], preset: TrainingConfig) -> TrainingConfig:
 
 @pytest.mark.parametrize(
     "name",
-    ["reacher", "drawn", "backbone", "alignment", "encoder_training", "policy_input", "remedies", "smoke"],
+    [
+        "reacher",
+        "drawn",
+        "backbone",
+        "alignment",
+        "encoder_training",
+        "policy_input",
+        "remedies",
+        "precision",
+        "smoke",
+    ],
 )
 def test_the_words_of_a_run_say_what_its_configuration_is(name: str) -> None:
     for run in [run for run in runs_of(name) if run.seed == 1]:
@@ -181,6 +191,13 @@ def test_a_remedy_is_taken_away_from_the_preset_and_cloning_only_where_there_is_
 
 def runs_of_remedies(preset_name: str) -> list[PlannedRun]:
     return SUITES["remedies"].runs(preset_name, seeds=[1])
+
+
+def test_two_precisions_differ_in_the_arithmetic_of_agent_and_reward_alone() -> None:
+    bf16, fp32 = (run.config for run in SUITES["precision"].runs(seeds=[1]))
+    assert (bf16.agent.precision, bf16.reward.bootifol.precision) == ("bf16", "bf16")
+    both = (("agent.precision", "fp32"), ("reward.bootifol.precision", "fp32"))
+    assert with_overrides(bf16, both) == fp32 != bf16
 
 
 def test_a_preset_that_clones_shows_what_cloning_alone_brings() -> None:
