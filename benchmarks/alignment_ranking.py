@@ -89,10 +89,12 @@ def main() -> None:
         raise BootifolError(f"there is no variant '{unknown[0]}'; the variants are {', '.join(chosen)}")
     if arguments.only:
         chosen = {name: chosen[name] for name in arguments.only}
-    videos, returns = graded(arguments.task, preset(arguments.preset).pictures, episodes=8)
+    video_size = held_out["expert"][0].frames.shape[1]
+    pictures = replace(preset(arguments.preset).pictures, video_size=video_size)
+    videos, returns = graded(arguments.task, pictures, episodes=8)
     with progress("aligning", total=len(chosen) * arguments.steps) as advance:
         for name, config in chosen.items():
-            model = BootifolRewardModel(config, held_out["expert"][0].frames.shape[1], arguments.seed)
+            model = BootifolRewardModel(config, video_size, arguments.seed)
             steps = model.align(sources["expert"], sources["random"])
             recent: list[float] = []
             for step in range(1, arguments.steps + 1):

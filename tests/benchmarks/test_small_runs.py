@@ -11,6 +11,9 @@ import pytest
 from PIL import Image
 
 from benchmarks import cloning, gallery
+from bootifol.demos.record import record
+from bootifol.envs.pictures import PictureConfig
+from bootifol.evaluation.ranking import KINDS
 from bootifol.tasks import TASKS
 
 RunBenchmark = Callable[..., int | None]
@@ -27,6 +30,36 @@ def run_benchmark(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> RunBenchma
         return importlib.import_module(f"benchmarks.{name}").main()
 
     return run
+
+
+def test_alignment_ranking(
+    run_benchmark: RunBenchmark, demos: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pictures = PictureConfig(agent_size=32, video_size=32)
+    for behavior in KINDS:
+        if behavior == "half_good":
+            record("drawn_home", behavior, 4, Path("demos") / behavior, pictures)
+        else:
+            Path("demos").mkdir(exist_ok=True)
+            (Path("demos") / behavior).symlink_to(demos / behavior)
+    words = [
+        "--task",
+        "drawn_home",
+        "--preset",
+        "smoke",
+        "--demos",
+        "demos",
+        "--held-out",
+        "1",
+        "--out",
+        "tau.csv",
+    ]
+    assert run_benchmark("alignment_ranking", *words, "--steps", "4", "--every", "2", "--only", "preset") == 0
+    header, *rows = Path("tau.csv").read_text().splitlines()
+    assert header.startswith("variant,gradient_step,sequence_loss,kendall_tau")
+    assert [row.split(",")[:2] for row in rows] == [["preset", "2"], ["preset", "4"]]
+    assert run_benchmark("alignment_ranking", *words, "--only", "presets") == 2
+    assert "there is no variant 'presets'" in capsys.readouterr().err
 
 
 def test_backbone(
