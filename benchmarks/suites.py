@@ -193,26 +193,27 @@ def backbone_comparison(config: TrainingConfig, timed: bool) -> list[System]:
 
 
 def alignment_ablation(config: TrainingConfig, timed: bool) -> list[System]:
-    """The paper's `alignment`, `no-alignment` and `no-alignment-1550K-step`."""
+    """The paper's `alignment`, `no-alignment` and `no-alignment-1550K-step`, the first two with its N_train."""
     without = ("alignment.gradient_steps", 0)
+    as_in_paper = trained(config, PAPER.interactive.reward_updates_until, timed)
     to_the_end = ("interactive.reward_updates_until", config.interactive.agent_steps)
     return [
-        System("bootifol"),
-        System("bootifol", "no_alignment", (without,)),
+        as_in_paper,
+        System("bootifol", "no_alignment", (without, *as_in_paper.overrides)),
         System("bootifol", "no_alignment_to_the_end", (without, to_the_end)),
     ]
 
 
 def encoder_training_ablation(config: TrainingConfig, timed: bool) -> list[System]:
     """N_train = 0, 100K, 375K and 1550K of the paper's 1550K agent steps, or the same shares of a shorter run."""
-    systems = []
-    for agent_steps in (0, 100_000, 375_000, 1_550_000):
-        percent = round(100 * agent_steps / PAPER.interactive.agent_steps)
-        until = equivalent_steps(config, agent_steps, timed)
-        systems.append(
-            System("bootifol", f"trained_{percent}_percent", (("interactive.reward_updates_until", until),))
-        )
-    return systems
+    return [trained(config, agent_steps, timed) for agent_steps in (0, 100_000, 375_000, 1_550_000)]
+
+
+def trained(config: TrainingConfig, agent_steps: int, timed: bool) -> System:
+    """BootIfOL with the equivalent of so many agent steps of the paper's as N_train."""
+    percent = round(100 * agent_steps / PAPER.interactive.agent_steps)
+    until = equivalent_steps(config, agent_steps, timed)
+    return System("bootifol", f"trained_{percent}_percent", (("interactive.reward_updates_until", until),))
 
 
 def failures(config: TrainingConfig, timed: bool) -> list[System]:

@@ -147,14 +147,15 @@ DRAWN = replace(
     demonstrations=DemonstrationConfig(),
     alignment=AlignmentConfig(gradient_steps=150, time_share=0.25, log_every=10),
     interactive=InteractiveConfig(
-        agent_steps=4500, reward_updates_until=2250, agent_videos=150, relabel_episodes=4, log_every=200
+        agent_steps=4500, reward_updates_until=850, agent_videos=150, relabel_episodes=4, log_every=200
     ),
     evaluation=EvaluationConfig(
         every=500, episodes=5, long_episodes=5, final_episodes=50, held_out_videos=16
     ),
 )
 """For the tasks drawn with numpy, at 32 pixels: a policy from videos in two minutes, without a simulator and
-with nothing cloned. The learning test runs it."""
+with nothing cloned. The learning test runs it. N_train is the share of the paper's 100K agent steps, the best of its
+four here (docs/results/drawn_home.md)."""
 
 SMOKE = replace(
     CPU,

@@ -223,11 +223,12 @@ def test_every_preset_says_how_many_videos_its_runs_want() -> None:
 def test_a_suite_takes_another_preset_and_other_tasks() -> None:
     runs = SUITES["alignment"].runs("drawn", ["drawn_home"], [7])
     assert [run.name for run in runs] == [
-        "drawn_home/bootifol/seed7",
+        "drawn_home/bootifol-trained_24_percent/seed7",
         "drawn_home/bootifol-no_alignment/seed7",
         "drawn_home/bootifol-no_alignment_to_the_end/seed7",
     ]
-    assert dict(runs[2].system.overrides)["interactive.reward_updates_until"] == 4500
+    assert [run.config.interactive.reward_updates_until for run in runs] == [1540, 1540, 4500]
+    assert [run.config.alignment.gradient_steps for run in runs] == [150, 0, 0]
     with pytest.raises(BootifolError, match="there is no task 'reacher_harder'"):
         SUITES["alignment"].runs(tasks=["reacher_harder"])
 
