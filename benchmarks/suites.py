@@ -157,9 +157,15 @@ def learning_test(config: TrainingConfig, timed: bool) -> list[System]:
 
 
 def virl_updates_every(config: TrainingConfig) -> int:
-    """Agent steps between two gradient steps of ViRL, so that it takes twice BootIfOL's, as in the paper: there 50."""
+    """Agent steps between two gradient steps of ViRL, so that it takes twice as many as BootIfOL, as in the paper.
+
+    There it has 50. BootIfOL's are counted with the equivalent of the paper's N_train, or the preset's where it is
+    later: one that lets BootIfOL's reward rest sooner should not make ViRL, which learns to the end, learn less.
+    """
     interactive, warm_up = config.interactive, config.agent.warm_up_steps
-    acting = max(interactive.reward_updates_until - warm_up, 0) / interactive.reward_update_every
+    as_in_paper = equivalent_steps(config, PAPER.interactive.reward_updates_until, timed=False)
+    until = max(as_in_paper, interactive.reward_updates_until)
+    acting = max(until - warm_up, 0) / interactive.reward_update_every
     wanted = 2 * (config.alignment.gradient_steps + acting)
     return max(round((interactive.agent_steps - warm_up) / max(wanted, 1.0)), 1)
 

@@ -23,7 +23,7 @@ from fake_program import write_config, write_end
 
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow, append_evaluations
-from bootifol.presets import BACKBONE, CPU, PAPER, PRESETS, preset
+from bootifol.presets import BACKBONE, CPU, DRAWN, PAPER, PRESETS, preset
 from bootifol.reports.paper_results import RETURNS
 from bootifol.reports.result_tables import result_tables
 from bootifol.reports.run_files import find_runs, read_run
@@ -152,6 +152,8 @@ def test_virl_takes_twice_as_many_gradient_steps_as_bootifol_whatever_the_preset
     assert virl_updates_every(PAPER) == 50  # N_update, with which the paper says so
     # cpu: 500 in the Alignment Phase and 9000 / 50 after it, twice that in 24,000 agent steps
     assert virl_updates_every(CPU) == round(24_000 / (2 * 680)) == 18
+    # Not fewer because BootIfOL's reward rests after 6 % of learning there: 940 agent steps are the paper's 375K.
+    assert virl_updates_every(DRAWN) == round(3900 / (2 * (150 + 940 / 50))) == 12
 
 
 def test_the_learning_test_compares_every_method_and_the_tutorials() -> None:
