@@ -127,7 +127,7 @@ def legend_above(figure: Figure) -> None:
         list(lines),
         loc="outside upper left",
         ncols=columns,
-        handlelength=2.4,
+        handlelength=3.8,
         columnspacing=1.2,
     )
 
