@@ -423,7 +423,7 @@ SUITES = {
     "smoke": Suite("three runs of seconds, which learn nothing", "smoke", ("drawn_home",), (1,), smallest),
 }
 
-VIDEOS = {"paper": 5032, "cpu": 1000, "demo": 700, "drawn": 150, "smoke": 12, "backbone": 1532}
+VIDEOS = {"paper": 5032, "cpu": 1000, "long": 1000, "demo": 700, "drawn": 150, "smoke": 12, "backbone": 1532}
 """Expert videos to record for each preset. The paper learns from 5000, with a backbone from 1500; up to 32 are held
 out to see how they rank."""
 

@@ -22,7 +22,7 @@ from bootifol.training.config import (
 )
 from bootifol.training.demonstrations import DemonstrationConfig
 
-PresetName = Literal["paper", "cpu", "demo", "drawn", "smoke", "backbone"]
+PresetName = Literal["paper", "cpu", "long", "demo", "drawn", "smoke", "backbone"]
 
 PAPER = TrainingConfig()
 """The paper's hyperparameters, which are the defaults of every field; what the paper leaves open (frame drop, window,
@@ -96,6 +96,15 @@ Beyond smaller sizes it departs from the paper where the paper's choice needs mo
 rewards follow it, `saturation_weight`, `ema_decay` and `cloning_weight` of the agent, `demonstrations`, by which the
 policy starts as a clone of the videos, and `augmentation` where these come from files; each is described at its field.
 """
+
+LONG = replace(
+    CPU,
+    agent=replace(CPU.agent, encoder="coarse", batch_size=64, update_every=10, replay_capacity=100_000),
+    interactive=replace(CPU.interactive, agent_steps=1_550_000, reward_updates_until=60_000),
+    evaluation=replace(CPU.evaluation, every=25_000),
+)
+"""`cpu` with an evening's time: the paper's 1.55M agent steps in about two and a half hours of one core, with smaller
+updates and fewer of them (docs/performance.md)."""
 
 BACKBONE = TrainingConfig(
     pictures=PictureConfig(video_size=224),
@@ -191,6 +200,7 @@ SMOKE = replace(
 PRESETS: dict[PresetName, TrainingConfig] = {
     "paper": PAPER,
     "cpu": CPU,
+    "long": LONG,
     "demo": DEMO,
     "drawn": DRAWN,
     "smoke": SMOKE,
