@@ -34,8 +34,11 @@ FrameBatch = NDArray[np.uint8]
 Features = NDArray[np.float32]
 """What a frozen pretrained network made of the pictures of one episode, float32 `[T + 1, F]`."""
 
-FeatureBatch = NDArray[np.float32]
-"""Features of videos of one length, float32 `[B, T + 1, F]`."""
+FrameStates = NDArray[np.int8]
+"""What eyes that rest made of the pictures of one episode, int8 `[T + 1, F]` (`networks/eyes.py`)."""
+
+FeatureBatch = NDArray[np.float32] | NDArray[np.int8]
+"""Features or states of videos of one length, `[B, T + 1, F]`."""
 
 Observation = NDArray[np.uint8]
 """What the agent sees: the newest frames stacked along channels, oldest first, uint8 `[H, W, 3 * stack]`."""
@@ -70,8 +73,8 @@ class Video:
     """The true rewards `[T]`. None, except on the agent's own episodes under the method named
     `environment` (the upper bound), which is the only one that may read them."""
 
-    features: Features | None = None
-    """Of the frames, where the reward model has a frozen backbone and they were computed already."""
+    features: Features | FrameStates | None = None
+    """Of the frames, where a frozen backbone or eyes that rest have computed them already."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,8 @@ class Batch:
     """`B` n-step transitions sampled from replay."""
 
     observation: torch.Tensor
-    """uint8 `[B, 3 * stack, S, S]`, channels-last in memory, randomly shifted."""
+    """uint8 `[B, 3 * stack, S, S]`, channels-last in memory, randomly shifted; or, where replay keeps the states of
+    frames, int8 `[B, stack * F]`."""
 
     action: torch.Tensor
     """float32 `[B, A]`."""
@@ -118,7 +122,7 @@ class Batch:
     """float32 `[B]`: the weight of the value of `next_observation`; 0 after a termination."""
 
     next_observation: torch.Tensor
-    """uint8 `[B, 3 * stack, S, S]`, as `observation`."""
+    """As `observation`."""
 
     demonstrated: torch.Tensor | None = None
     """bool `[B]`: which rows come from expert videos with inferred actions; None when none do (the paper)."""

@@ -17,7 +17,7 @@ from bootifol.errors import (
 
 Precision = Literal["bf16", "fp32"]
 EncoderName = Literal["paper", "strided", "coarse"]
-Observations = Literal["pictures", "encodings"]
+Observations = Literal["pictures", "encodings", "states"]
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class DrQv2Config:
     observations: Observations = "pictures"
     """pictures: convolutions of the agent's own read the frames (the paper's agent). encodings: an MLP reads what the
     reward model's frame encoder makes of them, always its newest version and without a random shift (the paper's
-    ablation of it); for reward methods that encode single frames."""
+    ablation of it); for reward methods that encode single frames. states (beyond the paper): the trunks read what
+    eyes that rest make of the frames; replay keeps that instead of pictures, and an update has no convolutions."""
 
     encoder: EncoderName = "paper"
     """Convolutions over the frame stack. paper: four 3x3 layers of 32 channels, strides 2, 1, 1, 1.
@@ -39,6 +40,9 @@ class DrQv2Config:
 
     hidden_dim: int = 1024
     """Width of the two hidden layers of the actor and of each critic."""
+
+    critic_norm: bool = False
+    """Beyond DrQ-v2: LayerNorm after the critics' hidden layers, which keeps Q in bounds where rewards move."""
 
     batch_size: int = 256
     """Transitions an update learns from."""

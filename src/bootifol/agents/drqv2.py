@@ -15,13 +15,23 @@ import torch
 from torch import Tensor, nn
 
 from bootifol.agents.config import DrQv2Config
-from bootifol.agents.encodings import FrameEncodings
-from bootifol.agents.networks import Actor, Critic, Encoder, EncodingEncoder, as_batch, initialize
+from bootifol.agents.encodings import FrameEncodings, StackedStates
+from bootifol.agents.networks import (
+    Actor,
+    Critic,
+    Encoder,
+    EncodingEncoder,
+    StateEncoder,
+    as_batch,
+    initialize,
+)
 from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
 from bootifol.gradient_step import take_step
 from bootifol.module_state import load_module_state, module_state
 from bootifol.types import Action, Arrays, Batch, Observation, StepMetrics
+
+AnyEncoder = Encoder | EncodingEncoder | StateEncoder
 
 SATURATED = 0.98
 """Mean actions beyond this are counted as saturated in the metrics."""
@@ -96,17 +106,17 @@ class DrQv2:
         action_dim: int,
         seed: int,
         device: str = "cpu",
-        encodings: FrameEncodings | None = None,
+        encodings: FrameEncodings | StackedStates | None = None,
     ) -> None:
         self.config = config
         self._device = torch.device(device)
-        self._encodings = encodings if config.observations == "encodings" else None
+        self._encodings = None if config.observations == "pictures" else encodings
         with torch.device("meta"):  # torch's own initialization would draw from the global generator
             self.encoder = self._make_encoder(3 * stack, frame_size)
             sizes = (self.encoder.feature_count, action_dim, config.feature_dim, config.hidden_dim)
             self.actor = Actor(*sizes)
-            self.critic = Critic(*sizes)
-            self.target_critic = Critic(*sizes)
+            self.critic = Critic(*sizes, config.critic_norm)
+            self.target_critic = Critic(*sizes, config.critic_norm)
         start = torch.Generator().manual_seed(seed)
         for network in (self.encoder, self.actor, self.critic, self.target_critic):
             network.to_empty(device="cpu")
@@ -116,7 +126,7 @@ class DrQv2:
         self.target_critic.load_state_dict(self.critic.state_dict())
         self.target_critic.requires_grad_(False)
         self._averages = 0
-        self._averaged: tuple[Encoder | EncodingEncoder, Actor] | None = None
+        self._averaged: tuple[AnyEncoder, Actor] | None = None
         if config.ema_decay > 0:
             self._averaged = copy.deepcopy(self.encoder), copy.deepcopy(self.actor)
         self._generator = torch.Generator().manual_seed(int(start.initial_seed()) + 1)
@@ -128,13 +138,15 @@ class DrQv2:
             [*self.encoder.parameters(), *self.actor.parameters()], config.learning_rate, fused=True
         )
 
-    def _make_encoder(self, channels: int, frame_size: int) -> Encoder | EncodingEncoder:
+    def _make_encoder(self, channels: int, frame_size: int) -> AnyEncoder:
+        if isinstance(self._encodings, StackedStates):
+            return StateEncoder(self._encodings.size)
         if self._encodings is not None:
             return EncodingEncoder(self._encodings.size, self.config.hidden_dim)
-        if self.config.observations == "encodings":
+        if self.config.observations != "pictures":
             raise BootifolError(
-                "agent.observations encodings needs a reward model whose encodings the agent reads; "
-                "without one use agent.observations pictures"
+                f"agent.observations {self.config.observations} needs a reward model whose {self.config.observations} "
+                "the agent reads; without one use agent.observations pictures"
             )
         encoder = Encoder(self.config.encoder, channels, frame_size)
         if encoder.feature_count == 0:
@@ -145,7 +157,7 @@ class DrQv2:
         return encoder
 
     @property
-    def acting(self) -> tuple[Encoder | EncodingEncoder, Actor]:
+    def acting(self) -> tuple[AnyEncoder, Actor]:
         """The networks that act without exploration: the averaged ones where there are any, else the newest."""
         return (self.encoder, self.actor) if self._averaged is None else self._averaged
 
@@ -264,7 +276,9 @@ class DrQv2:
         weight = max(1.0 - self.config.ema_decay, 1.0 / self._averages)
         with torch.no_grad():
             for average, newest in zip(self._averaged, (self.encoder, self.actor), strict=True):
-                torch._foreach_lerp_(list(average.parameters()), list(newest.parameters()), weight)
+                pairs = list(zip(average.parameters(), newest.parameters(), strict=True))
+                if pairs:  # states have no encoder that learns
+                    torch._foreach_lerp_([old for old, _ in pairs], [new for _, new in pairs], weight)
 
     def state(self) -> Arrays:
         """Copies of all parameters, of the optimizers and of the noise generator."""
@@ -304,9 +318,12 @@ class DrQv2:
         }
 
     def _network_input(self, observation: Tensor, dtype: torch.dtype) -> Tensor:
-        """What the encoder reads of pictures uint8 `[B, 3 * stack, S, S]`: they themselves, or their encodings."""
-        if self._encodings is not None:
+        """What the encoder reads of pictures uint8 `[B, 3 * stack, S, S]`: they themselves, or their encodings; and of
+        states int8 `[B, stack * Z]`, which stay whole numbers until then."""
+        if self._encodings is not None and observation.dtype == torch.uint8:
             observation = self._encodings(observation)
+        if observation.dtype == torch.int8:
+            return to_device(observation, self._device)
         return to_device(observation, self._device).to(dtype)
 
     @property

@@ -8,11 +8,12 @@ encodings that were stored would be those of an older one.
 from __future__ import annotations
 
 import numpy as np
+import torch
 from torch import Tensor
 
 from bootifol.envs.pictures import resize
-from bootifol.rewards.base import EncodesFrames
-from bootifol.types import Frames
+from bootifol.rewards.base import EncodesFrames, SeesFrames
+from bootifol.types import Frames, FrameStates
 
 _CHANNELS = 3
 
@@ -45,3 +46,40 @@ class FrameEncodings:
         if frames.shape[1] != self._model.video_size:
             frames = np.stack([resize(frame, self._model.video_size) for frame in frames])
         return self._model.encode_frames(frames).reshape(count, self.size)
+
+
+class StackedStates:
+    """Turns stacks of pictures into stacks of states, for acting; replay keeps states, and batches come with them.
+
+    Frames are seen one by one, each once: the last bits of a convolution depend on how many frames it has, and a
+    resumed run must see what the uninterrupted one did.
+
+    Args:
+        model: sees single frames, and learns no more how.
+        stack: frames in an observation.
+    """
+
+    def __init__(self, model: SeesFrames, stack: int) -> None:
+        self._model = model
+        self._stack = stack
+        self._seen: dict[bytes, FrameStates] = {}
+
+    @property
+    def size(self) -> int:
+        """Numbers in a stack of states, `stack * Z`."""
+        return self._stack * self._model.feature_size
+
+    def __call__(self, observation: Tensor) -> Tensor:
+        """States int8 `[1, stack * Z]`, oldest first, of one stack of pictures uint8 `[1, 3 * stack, S, S]`."""
+        size = observation.shape[-1]
+        frames = observation.reshape(self._stack, _CHANNELS, size, size).permute(0, 2, 3, 1).numpy()
+        seen: dict[bytes, FrameStates] = {}
+        stacked = []
+        for frame in frames:
+            key = frame.tobytes()
+            if key not in seen:
+                known = self._seen.get(key)
+                seen[key] = self._model.states(frame[None])[0] if known is None else known
+            stacked.append(seen[key])
+        self._seen = seen
+        return torch.from_numpy(np.concatenate(stacked))[None]

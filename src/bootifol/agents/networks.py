@@ -6,6 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from bootifol.agents.config import EncoderName
+from bootifol.networks.eyes import as_features
 from bootifol.types import Observation
 
 _CONVOLUTIONS: dict[EncoderName, tuple[tuple[int, int, int], ...]] = {
@@ -75,6 +76,22 @@ class EncodingEncoder(nn.Sequential):
         self.feature_count = hidden_dim
 
 
+class StateEncoder(nn.Module):
+    """States of frames as they are: the eyes that made them rest, and the trunks learn from them.
+
+    Args:
+        inputs: numbers in a stack of states.
+    """
+
+    def __init__(self, inputs: int) -> None:
+        super().__init__()
+        self.feature_count = inputs
+
+    def forward(self, states: Tensor) -> Tensor:
+        """Features float32 `[B, inputs]` of states int8 `[B, inputs]`."""
+        return as_features(states)
+
+
 class Trunk(nn.Sequential):
     """Features `[B, feature_count]` squeezed to `[B, feature_dim]` in (-1, 1)."""
 
@@ -88,14 +105,14 @@ class Head(nn.Module):
     A bfloat16 output could not tell a Q of 100.0 from one of 100.4.
     """
 
-    def __init__(self, inputs: int, hidden_dim: int, outputs: int) -> None:
+    def __init__(self, inputs: int, hidden_dim: int, outputs: int, normalized: bool = False) -> None:
         super().__init__()
-        self.hidden = nn.Sequential(
-            nn.Linear(inputs, hidden_dim),
-            nn.ReLU(inplace=True),
-            nn.Linear(hidden_dim, hidden_dim),
-            nn.ReLU(inplace=True),
-        )
+        self.hidden = nn.Sequential()
+        for width in (inputs, hidden_dim):
+            self.hidden.append(nn.Linear(width, hidden_dim))
+            if normalized:
+                self.hidden.append(nn.LayerNorm(hidden_dim))
+            self.hidden.append(nn.ReLU(inplace=True))
         self.output = nn.Linear(hidden_dim, outputs)
 
     def forward(self, inputs: Tensor) -> Tensor:
@@ -125,11 +142,13 @@ class Actor(nn.Module):
 class Critic(nn.Module):
     """Two independent estimates of Q, each `[B]`, on one trunk."""
 
-    def __init__(self, feature_count: int, action_dim: int, feature_dim: int, hidden_dim: int) -> None:
+    def __init__(
+        self, feature_count: int, action_dim: int, feature_dim: int, hidden_dim: int, normalized: bool = False
+    ) -> None:
         super().__init__()
         self.trunk = Trunk(feature_count, feature_dim)
-        self.q1 = Head(feature_dim + action_dim, hidden_dim, 1)
-        self.q2 = Head(feature_dim + action_dim, hidden_dim, 1)
+        self.q1 = Head(feature_dim + action_dim, hidden_dim, 1, normalized)
+        self.q2 = Head(feature_dim + action_dim, hidden_dim, 1, normalized)
 
     def forward(self, features: Tensor, action: Tensor) -> tuple[Tensor, Tensor]:
         return self.value(self.trunk(features), action)

@@ -27,7 +27,13 @@ class AgentVideos:
     """
 
     def __init__(
-        self, capacity: int, frames: int, size: int, feature_size: int = 0, failures_share: float = 1.0
+        self,
+        capacity: int,
+        frames: int,
+        size: int,
+        feature_size: int = 0,
+        feature_bytes: int = 4,
+        failures_share: float = 1.0,
     ) -> None:
         """Reserves the memory (the system hands it out as episodes arrive).
 
@@ -36,22 +42,28 @@ class AgentVideos:
             frames: frames of an episode, T + 1; a shorter episode stands still on its last frame.
             size: height and width of a frame in pixels.
             feature_size: features of a frame, kept instead of its pixels; 0 keeps the pixels.
+            feature_bytes: 4 for float32 features, 1 for int8 states.
             failures_share: share of the videos, those of the lowest learned reward, that `sample` draws from.
         """
         if capacity < 1:
             raise BootifolError(f"the agent's videos need room for at least 1 episode, not {capacity}")
         size = 0 if feature_size else size
         self._frames: FrameBatch = np.zeros((capacity, frames, size, size, 3), np.uint8)
-        self._features: FeatureBatch = np.zeros((capacity, frames, feature_size), np.float32)
+        shape = (capacity, frames, feature_size)
+        self._features: FeatureBatch = (
+            np.zeros(shape, np.float32) if feature_bytes == 4 else np.zeros(shape, np.int8)
+        )
         self._rewards = np.zeros(capacity, np.float32)
         self._failures_share = failures_share
         self._names: list[str] = []
         self._next = 0
 
     @staticmethod
-    def bytes_needed(capacity: int, frames: int, size: int, feature_size: int = 0) -> int:
+    def bytes_needed(
+        capacity: int, frames: int, size: int, feature_size: int = 0, feature_bytes: int = 4
+    ) -> int:
         """Memory of a full ring, in bytes."""
-        return capacity * frames * (4 * feature_size or size * size * 3)
+        return capacity * frames * (feature_bytes * feature_size or size * size * 3)
 
     def add(self, video: Video, reward: float = 0.0) -> None:
         """Keeps a video, in the place of the oldest one when full.
@@ -159,7 +171,8 @@ class AgentVideos:
         if video.features is None or found != expected:
             raise BootifolError(
                 f"the video {video.name} has {'no features' if found is None else f'features {list(found)}'} and the "
-                f"agent's videos are kept as {expected[1]} features a frame: compute them with the run's backbone"
+                f"agent's videos are kept as {expected[1]} features a frame: compute them with the run's backbone or "
+                "eyes"
             )
         slot = self._features[self._next]
         slot[: len(video.features)] = video.features

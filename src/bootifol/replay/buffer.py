@@ -19,7 +19,9 @@ observation is that of `min(t + n, T)`. So no batch crosses the border of an epi
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import torch
@@ -27,9 +29,10 @@ from numpy.typing import NDArray
 
 from bootifol.errors import BootifolError
 from bootifol.replay.crops import crop_stacks
-from bootifol.types import Arrays, Batch, Episode, Rewards
+from bootifol.types import Arrays, Batch, Episode, Frames, FrameStates, Rewards
 
 _CHANNELS = 3
+_SCORED_AT_ONCE = 8192
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,7 @@ class ReplayBuffer:
         n_step: rewards summed before bootstrapping.
         discount: per agent step, in [0, 1].
         shift: largest random shift in pixels; 0 turns the augmentation off.
+        feature_size: F, where frames are kept as the states of eyes that rest, int8 `[F]`; 0 keeps their pixels.
 
     Raises:
         BootifolError: a size is out of range or the memory cannot be had.
@@ -67,6 +71,7 @@ class ReplayBuffer:
         n_step: int = 3,
         discount: float = 0.99,
         shift: int = 4,
+        feature_size: int = 0,
     ) -> None:
         if (
             capacity < 2
@@ -84,12 +89,17 @@ class ReplayBuffer:
         self.n_step = n_step
         self.discount = discount
         self.shift = shift
+        self.keeps_states = feature_size > 0
         try:
-            self._frames = np.zeros((capacity, frame_size, frame_size, _CHANNELS), dtype=np.uint8)
+            self._frames: NDArray[np.uint8] | NDArray[np.int8] = (
+                np.zeros((capacity, feature_size), dtype=np.int8)
+                if self.keeps_states
+                else np.zeros((capacity, frame_size, frame_size, _CHANNELS), dtype=np.uint8)
+            )
             self._actions = np.zeros((capacity, action_dim), dtype=np.float32)
             self._rewards = np.zeros(capacity, dtype=np.float32)
         except MemoryError:
-            needed = self.bytes_needed(capacity, frame_size, action_dim)
+            needed = self.bytes_needed(capacity, frame_size, action_dim, feature_size)
             raise BootifolError(
                 f"replay of {capacity} frames of {frame_size}x{frame_size} needs {needed / 1e9:.1f} GB, which "
                 "this machine refuses; choose a smaller replay capacity or smaller frames"
@@ -101,9 +111,9 @@ class ReplayBuffer:
         self._index()
 
     @staticmethod
-    def bytes_needed(capacity: int, frame_size: int, action_dim: int) -> int:
+    def bytes_needed(capacity: int, frame_size: int, action_dim: int, feature_size: int = 0) -> int:
         """Bytes of a full buffer, known before it takes them (the system hands them out as episodes arrive)."""
-        return capacity * (_CHANNELS * frame_size**2 + 4 * action_dim + 4)
+        return capacity * ((feature_size or _CHANNELS * frame_size**2) + 4 * action_dim + 4)
 
     def __len__(self) -> int:
         """Transitions that can be sampled."""
@@ -118,7 +128,7 @@ class ReplayBuffer:
         """Stores an episode, dropping the oldest ones where it needs their slots.
 
         Args:
-            episode: frames uint8 `[T + 1, S, S, 3]`, actions `[T, A]`.
+            episode: frames uint8 `[T + 1, S, S, 3]`, or states int8 `[T + 1, F]` of its video; actions `[T, A]`.
             rewards: float32 `[T]`.
 
         Returns:
@@ -129,13 +139,14 @@ class ReplayBuffer:
         """
         steps = episode.agent_steps
         slots = steps + 1
-        self._check_episode(episode)
+        frames = episode.video.features if self.keeps_states else episode.frames
+        self._check_episode(episode, frames)
         self._check_rewards(rewards, steps, self._next_id)
         used = sum(stored.agent_steps + 1 for stored in self._episodes)
         while used + slots > self.capacity:
             used -= self._episodes.popleft().agent_steps + 1
         where = (self._head + np.arange(slots)) % self.capacity
-        self._frames[where] = episode.frames
+        self._frames[where] = frames  # type: ignore[assignment]
         self._actions[where[:-1]] = episode.actions
         self._rewards[where[:-1]] = rewards
         self._episodes.append(_Stored(self._next_id, self._head, steps, episode.terminated))
@@ -171,6 +182,21 @@ class ReplayBuffer:
         if actions is not None:
             self._actions[slots] = actions
         return True
+
+    def relabel_all(self, score: Callable[[FrameStates], Rewards]) -> None:
+        """Rewards every step anew by the frame that followed it; for a buffer that keeps states.
+
+        Args:
+            score: rewards `[N]` of frames by their states int8 `[N, F]`.
+        """
+        written = self._slots_written
+        chunks = [
+            slice(first, min(first + _SCORED_AT_ONCE, written))
+            for first in range(0, written, _SCORED_AT_ONCE)
+        ]
+        scores = np.concatenate([score(cast(FrameStates, self._frames[chunk])) for chunk in chunks])
+        # The last slot of an episode has a frame only; what it gets from the next episode's first is never read.
+        self._rewards[:written] = np.roll(scores, -1)
 
     def sample(
         self,
@@ -286,24 +312,28 @@ class ReplayBuffer:
         shifts: NDArray[np.int64],
         has_history: NDArray[np.bool_] | None,
     ) -> torch.Tensor:
-        """The shifted stacks ending at frame `t`, uint8 `[B, 3 * stack, S, S]`, channels-last in memory."""
+        """The stacks ending at frame `t`: shifted pictures uint8 `[B, 3 * stack, S, S]`, channels-last in memory, or
+        states int8 `[B, stack * F]`."""
         ages = np.arange(self.stack - 1, -1, -1)
         if has_history is not None:
             ages = ages * has_history[:, None]
         slots = self._slot(start[:, None], np.maximum(t[:, None] - ages, 0))
+        if self.keeps_states:
+            return torch.from_numpy(self._frames[slots].reshape(len(t), -1))
         size = self._frames.shape[1]
         out = torch.empty((len(t), size, size, _CHANNELS * self.stack), dtype=torch.uint8)
-        crop_stacks(self._frames, slots, shifts, out.numpy())
+        crop_stacks(cast(Frames, self._frames), slots, shifts, out.numpy())
         return out.permute(0, 3, 1, 2)
 
-    def _check_episode(self, episode: Episode) -> None:
+    def _check_episode(self, episode: Episode, frames: NDArray[np.generic] | None) -> None:
         steps = episode.agent_steps
-        frames, actions = (steps + 1, *self._frames.shape[1:]), (steps, *self._actions.shape[1:])
-        if steps < 1 or episode.frames.shape != frames or episode.frames.dtype != np.uint8:
+        expected, actions = (steps + 1, *self._frames.shape[1:]), (steps, *self._actions.shape[1:])
+        dtype = self._frames.dtype
+        if steps < 1 or frames is None or frames.shape != expected or frames.dtype != dtype:
+            found = "none" if frames is None else f"{frames.dtype} {frames.shape}"
             raise BootifolError(
-                f"an episode of {steps} actions for replay must have at least one action and uint8 frames "
-                f"{frames}, but has {episode.frames.dtype} frames {episode.frames.shape}; check the agent's "
-                "picture size"
+                f"an episode of {steps} actions for replay must have at least one action and {dtype} frames "
+                f"{expected}, but has {found}; check the agent's picture size"
             )
         if episode.actions.shape != actions or not np.isfinite(episode.actions).all():
             raise BootifolError(

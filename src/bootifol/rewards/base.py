@@ -7,7 +7,7 @@ from typing import Protocol, runtime_checkable
 
 from torch import Tensor
 
-from bootifol.types import Arrays, Frames, Metrics, Rewards, Video, VideoSource
+from bootifol.types import Arrays, Frames, FrameStates, Metrics, Rewards, Video, VideoSource
 
 
 class RewardModel(Protocol):
@@ -58,6 +58,32 @@ class RewardModel(Protocol):
         ...
 
     def load_state(self, arrays: Arrays) -> None: ...
+
+
+@runtime_checkable
+class SeesFrames(Protocol):
+    """What a reward model also implements whose eyes rest once the agent acts: frames become states once, and agent,
+    inverse dynamics and the reward itself learn from those."""
+
+    video_size: int
+    """Side of the frames, in pixels."""
+
+    @property
+    def feature_size(self) -> int:
+        """Z, numbers in a state."""
+        ...
+
+    def states(self, frames: Frames) -> FrameStates:
+        """States int8 `[N, Z]` of frames uint8 `[N, S, S, 3]`."""
+        ...
+
+    def with_features(self, video: Video) -> Video:
+        """The video with the states of its frames."""
+        ...
+
+    def score(self, states: FrameStates) -> Rewards:
+        """Rewards float32 `[N]` of frames by their states int8 `[N, Z]`."""
+        ...
 
 
 @runtime_checkable

@@ -13,10 +13,11 @@ from bootifol.networks.backbones import Backbone, load_backbone
 from bootifol.own_modules import is_own_name, own_callable
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.bootifol.frames.model import FrameRewardModel
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.context_translation.model import ContextTranslationRewardModel
-from bootifol.rewards.environment import EnvironmentRewardModel
+from bootifol.rewards.environment import EnvironmentRewardModel, SeeingEnvironmentRewardModel
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.gaifo.model import GaifoRewardModel
 from bootifol.rewards.own import own_reward_model
@@ -49,27 +50,51 @@ class Method:
     """What it is, and whose."""
 
     make: Callable[..., RewardModel]
-    """Its reward model, from (its section of `RewardConfig` or None, video_size, seed, device)."""
+    """Its reward model, from (a section of `RewardConfig`, video_size, seed, device)."""
+
+    section: str
+    """Which section."""
+
+
+def make_bootifol(config: BootifolConfig, video_size: int, seed: int, device: str = "cpu") -> RewardModel:
+    """BootIfOL's reward model: of sequences, as in the paper, or of single frames."""
+    if config.reward == "frames":
+        return FrameRewardModel(config.frames, video_size, seed, device)
+    return BootifolRewardModel(config, video_size, seed, device)
+
+
+def make_environment_reward(
+    config: BootifolConfig, video_size: int, seed: int, device: str = "cpu"
+) -> RewardModel:
+    """The true reward; with the eyes of BootIfOL's reward from single frames where that is configured."""
+    if config.reward == "frames":
+        return SeeingEnvironmentRewardModel(config.frames, video_size, seed, device)
+    return EnvironmentRewardModel()
 
 
 METHODS = {
     "bootifol": Method(
         "contrastive learning, bootstrapped on the agent's own failures (Djeafea Sonwa et al., 2022)",
-        BootifolRewardModel,
+        make_bootifol,
+        "bootifol",
     ),
     "virl": Method(
         "siamese recurrent networks, trained only while the agent acts (Berseth and Pal, 2019)",
         VirlRewardModel,
+        "virl",
     ),
     "context_translation": Method(
         "expert videos translated into the agent's first frame (Liu et al., 2018)",
         ContextTranslationRewardModel,
+        "context_translation",
     ),
     "gaifo": Method(
-        "a discriminator on three successive frames (Torabi, Warnell and Stone, 2018)", GaifoRewardModel
+        "a discriminator on three successive frames (Torabi, Warnell and Stone, 2018)",
+        GaifoRewardModel,
+        "gaifo",
     ),
     "environment": Method(
-        "the environment's own reward: an upper bound, not imitation", lambda *_: EnvironmentRewardModel()
+        "the environment's own reward: an upper bound, not imitation", make_environment_reward, "bootifol"
     ),
 }
 """Every method by name."""
@@ -129,4 +154,5 @@ def make_reward_model(
     check_method(method)
     if method not in METHODS:
         return own_reward_model(method, video_size, seed, device)
-    return METHODS[method].make(getattr(config, method, None), video_size, seed, device)
+    known = METHODS[method]
+    return known.make(getattr(config, known.section), video_size, seed, device)

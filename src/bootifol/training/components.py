@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
 from rich.console import Console
 
 from bootifol.agents.drqv2 import DrQv2
-from bootifol.agents.encodings import FrameEncodings
+from bootifol.agents.encodings import FrameEncodings, StackedStates
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.demos.augmentation import AugmentationConfig
@@ -26,7 +26,7 @@ from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import KINDS
 from bootifol.networks.backbones import Backbone
 from bootifol.replay.buffer import ReplayBuffer
-from bootifol.rewards.base import EncodesFrames, RewardModel
+from bootifol.rewards.base import EncodesFrames, RewardModel, SeesFrames
 from bootifol.rewards.registry import make_backbone, make_reward_model
 from bootifol.tasks import make_environment
 from bootifol.training.checkpoint import Stateful
@@ -51,6 +51,19 @@ class Demos:
     """How videos vary in looks when the reward learns from them; None where they do not."""
 
 
+class Featurizer(Protocol):
+    """A backbone, or a reward model whose eyes rest."""
+
+    @property
+    def feature_size(self) -> int:
+        """F, features of a frame."""
+        ...
+
+    def with_features(self, video: Video) -> Video:
+        """The video with the features of its frames."""
+        ...
+
+
 @dataclass(frozen=True)
 class Learners:
     """The networks of a run."""
@@ -59,6 +72,11 @@ class Learners:
     backbone: Backbone | None
     """Frozen, and so no part of a checkpoint; None where the reward model reads pixels."""
     agent: DrQv2
+
+    @property
+    def featurizer(self) -> Featurizer | None:
+        """What turns the agent's frames into features or states, once; None where everything reads pixels."""
+        return self.backbone or (self.reward_model if isinstance(self.reward_model, SeesFrames) else None)
 
 
 @dataclass(frozen=True)
@@ -101,12 +119,16 @@ def build_backbone(run: RunConfig) -> Backbone | None:
 def build_agent(
     run: RunConfig, environment: gymnasium.Env[Any, Any], reward_model: RewardModel | None
 ) -> DrQv2:
-    """The agent, untrained. The reward model is the run's; only one that `sees_encodings` needs it.
+    """The agent, untrained. The reward model is the run's; an agent that reads pictures does not need it.
 
     Raises:
         BootifolError: the agent shall act on encodings, and the reward model has none for its pictures.
     """
-    encodings = _encodings(run, reward_model) if sees_encodings(run) else None
+    encodings: FrameEncodings | StackedStates | None = None
+    if run.training.agent.observations == "encodings":
+        encodings = _encodings(run, reward_model)
+    elif run.training.agent.observations == "states":
+        encodings = _states(run, reward_model)
     assert isinstance(environment.action_space, gymnasium.spaces.Box)
     pictures = run.training.pictures
     return DrQv2(
@@ -120,9 +142,31 @@ def build_agent(
     )
 
 
-def sees_encodings(run: RunConfig) -> bool:
-    """Whether the agent acts on the reward model's encodings instead of pictures."""
-    return run.training.agent.observations == "encodings"
+def reads_pictures(run: RunConfig) -> bool:
+    """Whether the agent's own networks read the pictures, and not what the reward model makes of them."""
+    return run.training.agent.observations == "pictures"
+
+
+def _states(run: RunConfig, reward_model: RewardModel | None) -> StackedStates:
+    if not isinstance(reward_model, SeesFrames):
+        raise BootifolError(
+            f"agent.observations states needs a reward model with eyes, which {run.method} as configured has not: "
+            "choose --method bootifol with --reward.bootifol.reward frames, or --agent.observations pictures"
+        )
+    pictures = run.training.pictures
+    if pictures.agent_size != pictures.video_size:
+        raise BootifolError(
+            f"agent.observations states needs pictures of one size for agent and reward, not {pictures.agent_size} "
+            f"and {pictures.video_size}: pass --pictures.agent-size {pictures.video_size}"
+        )
+    return StackedStates(reward_model, pictures.stack)
+
+
+def _state_size(run: RunConfig, reward_model: RewardModel) -> int:
+    """Numbers in the states that replay keeps; 0 where it keeps pictures."""
+    if run.training.agent.observations != "states" or not isinstance(reward_model, SeesFrames):
+        return 0
+    return reward_model.feature_size
 
 
 def _encodings(run: RunConfig, reward_model: RewardModel | None) -> FrameEncodings:
@@ -146,8 +190,8 @@ def _encodings(run: RunConfig, reward_model: RewardModel | None) -> FrameEncodin
 
 
 def _shift(run: RunConfig) -> int:
-    """Of the pictures that replay gives out; encodings are of whole pictures."""
-    return 0 if sees_encodings(run) else run.training.agent.random_shift
+    """Of the pictures that replay gives out; encodings and states are of whole ones."""
+    return run.training.agent.random_shift if reads_pictures(run) else 0
 
 
 def demonstrated_videos(run: RunConfig, expert: VideoSource) -> int:
@@ -205,17 +249,19 @@ def build_components(
     assert isinstance(environment.action_space, gymnasium.spaces.Box)
     action_dim = environment.action_space.shape[0]
     frames = run.resolved_task().episode_steps + 1
-    reward_model, backbone = learners.reward_model, learners.backbone
+    reward_model, featurizer = learners.reward_model, learners.featurizer
+    state_size = _state_size(run, reward_model)
     ring = (
         config.interactive.agent_videos,
         frames,
         pictures.video_size,
-        backbone.feature_size if backbone else 0,
+        featurizer.feature_size if featurizer else 0,
+        1 if isinstance(featurizer, SeesFrames) else 4,
     )
     # The upper bound has no demonstrations: it learns from true rewards, which videos do not tell.
     demonstrated = 0 if reward_model.reads_environment_reward else demonstrated_videos(run, expert)
     size = pictures.agent_size
-    replay_bytes = ReplayBuffer.bytes_needed(config.agent.replay_capacity, size, action_dim)
+    replay_bytes = ReplayBuffer.bytes_needed(config.agent.replay_capacity, size, action_dim, state_size)
     video_bytes = AgentVideos.bytes_needed(*ring)
     parts = [
         f"replay {replay_bytes / 1e9:.2f} GB ({config.agent.replay_capacity:,} frames)",
@@ -227,7 +273,7 @@ def build_components(
     console.print(f"memory when full: {', '.join(parts)}")
     return Components(
         reward_model=reward_model,
-        backbone=backbone,
+        backbone=learners.backbone,
         agent=learners.agent,
         replay=ReplayBuffer(
             config.agent.replay_capacity,
@@ -237,8 +283,9 @@ def build_components(
             config.agent.n_step,
             config.agent.discount,
             _shift(run),
+            state_size,
         ),
-        agent_videos=AgentVideos(*ring, config.interactive.failures_share),
+        agent_videos=AgentVideos(*ring, failures_share=config.interactive.failures_share),
         demonstrations=build_demonstrations(run, expert, action_dim) if demonstrated else None,
     )
 

@@ -58,6 +58,10 @@ class InteractiveConfig:
     """Stored episodes rewarded anew after each update of the reward, drawn at random among those still in replay; 0 as
     in the paper, whose stored rewards go stale."""
 
+    relabel_every: int = 100
+    """Where replay keeps states: updates of the reward after which every stored step is rewarded anew, which takes a
+    fraction of a second. `relabel_episodes` is not read then."""
+
     log_every: int = 1000
     """Agent steps a line of metrics averages over."""
 
@@ -76,6 +80,7 @@ class InteractiveConfig:
             1,
             reward_update_every=self.reward_update_every,
             agent_videos=self.agent_videos,
+            relabel_every=self.relabel_every,
             log_every=self.log_every,
         )
 

@@ -6,7 +6,7 @@ the reward learns to tell from the expert's, they bootstrap that reward.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium
@@ -16,13 +16,13 @@ from bootifol.agents.drqv2 import DrQv2
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.demos.augmentation import AugmentationConfig, augmented
 from bootifol.envs.rollout import EpisodeRecorder, rollout
-from bootifol.networks.backbones import Backbone
 from bootifol.replay.buffer import ReplayBuffer
-from bootifol.rewards.base import RewardModel
+from bootifol.rewards.base import RewardModel, SeesFrames
 from bootifol.rewards.references import draw_references
 from bootifol.tracking import Averages
 from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.cloning import cloning_due
+from bootifol.training.components import Featurizer
 from bootifol.training.config import InteractiveConfig
 from bootifol.training.demonstrations import Demonstrations
 from bootifol.types import Action, Batch, Observation, VideoSource
@@ -51,7 +51,7 @@ class InteractivePhase:
     seed: int
     rng: np.random.Generator
     """Draws reference videos and replay batches."""
-    backbone: Backbone | None = None
+    featurizer: Featurizer | None = None
     """Computes the features of every frame once, where the reward model reads features."""
     augmentation: AugmentationConfig | None = None
     """How videos vary in looks when the reward learns from them; None where they do not."""
@@ -78,7 +78,9 @@ class InteractivePhase:
             self._update_agent()
             self._update_reward()
         episode = recorder.episode()
-        video = episode.video if self.backbone is None else self.backbone.with_features(episode.video)
+        if self.featurizer is not None:
+            episode = replace(episode, video=self.featurizer.with_features(episode.video))
+        video = episode.video
         rewards = self.reward_model.label(video, references)
         self.replay.add(episode, rewards)
         self.agent_videos.add(video, float(rewards.mean()))
@@ -135,6 +137,10 @@ class InteractivePhase:
         if self.reward_model.version == version:
             return  # nothing was learned, so no stored reward is stale
         self.counters.reward_updates += 1
+        if isinstance(self.reward_model, SeesFrames) and self.replay.keeps_states:
+            if self.counters.reward_updates % self.config.relabel_every == 0:
+                self.replay.relabel_all(self.reward_model.score)
+            return
         for _ in range(self.config.relabel_episodes):
             self._relabel_one()
 

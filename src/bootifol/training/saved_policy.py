@@ -10,7 +10,7 @@ from bootifol.agents.policy import Policy, PolicyConfig, read_policy, write_poli
 from bootifol.envs.pixels import PixelEnvironment
 from bootifol.errors import BootifolError
 from bootifol.training.checkpoint import Progress, load_checkpoint, newest_checkpoint
-from bootifol.training.components import build_agent, build_environment, build_reward_model, sees_encodings
+from bootifol.training.components import build_agent, build_environment, build_reward_model, reads_pictures
 from bootifol.training.run_config import RunConfig
 from bootifol.types import AnyPath
 
@@ -61,7 +61,7 @@ def save_policy(
         agent: that it trains.
         agent_steps: of training so far.
     """
-    if not sees_encodings(run):
+    if reads_pictures(run):
         write_policy(directory / NAME, _policy_config(run, environment, agent_steps), agent)
 
 
@@ -73,7 +73,7 @@ def restored_agent(run: RunConfig, directory: Path, environment: PixelEnvironmen
     """
     checkpoint = require_checkpoint(directory)
     # Others act without it, so a backbone or a module of one's own may be missing.
-    reward_model = build_reward_model(run) if sees_encodings(run) else None
+    reward_model = None if reads_pictures(run) else build_reward_model(run)
     if reward_model is not None:
         load_checkpoint(checkpoint, {"reward_model": reward_model})
     agent = build_agent(run, environment, reward_model)

@@ -94,7 +94,7 @@ class Run:
             counters=self.counters,
             seed=self.run.seed,
             rng=self.rng,
-            backbone=self.components.backbone,
+            featurizer=self.components.featurizer,
             augmentation=self.demos.augmentation,
         )
         self.measurements = Measurements(

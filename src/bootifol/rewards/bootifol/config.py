@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
 
@@ -14,15 +14,21 @@ from bootifol.errors import (
     require_choices,
     require_positive,
 )
+from bootifol.rewards.bootifol.frames.config import FrameConfig
 
 
 @dataclass(frozen=True)
 class BootifolConfig:
     """BootIfOL's reward model."""
 
-    reward: Literal["distance", "cosine"] = "distance"
+    reward: Literal["distance", "cosine", "frames"] = "distance"
     """distance (the paper): minus the Euclidean distance between the encodings of agent and expert.
-    cosine (a version of the authors' release): their cosine similarity, in [-1, 1]."""
+    cosine (a version of the authors' release): their cosine similarity, in [-1, 1].
+    frames (beyond the paper): the chance that a single frame is the expert's (docs/frames.md); then only the section
+    `frames` is read, and what only a sequence needs is not built."""
+
+    frames: FrameConfig = field(default_factory=FrameConfig)
+    """The reward from single frames."""
 
     backbone: str | None = None
     """None: g_theta learns from pixels (the paper's BootIfOL). A name: g_theta is this frozen pretrained network and

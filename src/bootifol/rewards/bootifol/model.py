@@ -161,7 +161,7 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         """
         config = self.config
         count, length = videos.shape[:2]
-        inputs = self._inputs(videos.reshape(-1, *videos.shape[2:]))
+        inputs = self._inputs(cast(Frames | Features, videos.reshape(-1, *videos.shape[2:])))
         with self._autocast():
             states = self.networks.frame_encoder(*inputs).float()
         within = np.arange(count)[:, None] * length
@@ -236,7 +236,7 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
                 f"the reward model learns from features of the backbone {self.backbone.name}, and these videos have "
                 "none of it: wrap a demo set in bootifol.demos.features.FeaturizedVideos"
             )
-        return features
+        return cast(NDArray[np.float32], features)
 
     def _checked_inputs(self, video: Video) -> Frames | Features:
         """What g_theta reads of a video, `[T + 1, H, W, 3]` or `[T + 1, F]`."""
@@ -244,7 +244,7 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
             return self._checked(video.frames)
         features = self.backbone.with_features(video).features
         assert features is not None
-        return features
+        return cast(Features, features)
 
     def _inputs(self, frames: Frames | Features) -> tuple[torch.Tensor, ...]:
         """Pixels `[N, H, W, 3]` to the views L `[N, 1, H, W]` and ab `[N, 2, H, W]`; features `[N, F]` as they are."""

@@ -1,0 +1,76 @@
+"""What can be chosen about the reward that sees single frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+from bootifol.errors import fields_of, require_at_least, require_choices, require_positive, require_share
+
+
+@dataclass(frozen=True)
+class FrameConfig:
+    """The frame contrast, its eyes and its head; read where the reward is `frames`."""
+
+    frame_weight: float = 0.5
+    """Weight of L_F, which tells the expert's frames from others."""
+
+    episode_weight: float = 0.3
+    """Weight of L_E, which tells what is one episode's alone: where its goal lies. 0 leaves it out."""
+
+    time_weight: float = 0.5
+    """Weight of L_T, which tells the moments of one video apart. 0 leaves it out."""
+
+    agent_weight: float = 0.5
+    """Weight of L_B, by which the agent's frames bootstrap the head in the Interactive Phase."""
+
+    reward: Literal["chance", "logit"] = "chance"
+    """What rewards a frame of logit x. chance: sigmoid(x), the chance that it is the expert's, in (0, 1). logit: x / 5,
+    cut at -1 and 1, which still rises where the head is sure."""
+
+    temperature: float = 0.1
+    """tau of L_E and L_T."""
+
+    videos_per_class: int = 16
+    """Videos of either class in a gradient step of the Alignment Phase, and six frames of each."""
+
+    frames_per_class: int = 96
+    """Frames of either class in a gradient step of the Interactive Phase."""
+
+    random_share: float = 0.33
+    """Share of random videos among the frames that are not the expert's in the Interactive Phase; the rest is the
+    agent's."""
+
+    channels: int = 16
+    """Features of each of a map's 8 x 8 cells."""
+
+    width: int = 32
+    """Channels of the eyes' inner layers."""
+
+    hidden_dim: int = 128
+    """Width of the two hidden layers of the head."""
+
+    shift: int = 2
+    """Largest random shift of the pictures, in pixels, while the eyes learn."""
+
+    noise: float = 0.05
+    """Standard deviation of the noise on the features that the head learns from in the Interactive Phase."""
+
+    learning_rate: float = 1e-3
+    """Of Adam in the Alignment Phase."""
+
+    head_learning_rate: float = 3e-4
+    """Of Adam in the Interactive Phase."""
+
+    precision: Literal["fp32", "bf16"] = "fp32"
+    """bf16 computes the convolutions in bfloat16 while they learn."""
+
+    def __post_init__(self) -> None:
+        of_self = partial(fields_of, "frames", self)
+        require_choices("frames", self)
+        require_at_least(0, **of_self("frame_weight", "episode_weight", "time_weight", "shift", "noise"))
+        require_at_least(1, **of_self("frames_per_class", "channels", "width", "hidden_dim"))
+        require_at_least(2, **of_self("videos_per_class"))
+        require_positive(**of_self("temperature", "learning_rate", "head_learning_rate"))
+        require_share(**of_self("random_share"))

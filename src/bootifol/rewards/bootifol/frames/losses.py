@@ -1,0 +1,76 @@
+"""The contrast of single frames: pure functions of logits and features, one equation each.
+
+Beyond the paper. Notation: x is the head's logit of a frame, u and v are projections of length 1 of its features.
+"""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+
+
+def frame_loss(expert: torch.Tensor, other: torch.Tensor) -> torch.Tensor:
+    """L_F: the head tells the expert's frames from others.
+
+    `L_F = -(E_expert[ log sigmoid(x) ] + E_other[ log sigmoid(-x) ]) / 2`
+
+    It is log 2 for a head that knows nothing.
+
+    Args:
+        expert: logits `[N]` of the expert's frames.
+        other: logits `[M]` of random videos' or the agent's.
+    """
+    return (F.softplus(-expert.float()).mean() + F.softplus(other.float()).mean()) / 2
+
+
+def bootstrap_loss(agent: torch.Tensor) -> torch.Tensor:
+    """L_B: the agent's frames that are not the expert's get less; those that are lose nothing.
+
+    `L_B = E_agent[ sigmoid(x) ]`
+
+    The agent's frames are unlabeled: some are failures, some are as good as the expert's. Beside `-E_expert[ log
+    sigmoid(x) ]`, and where no random frame is, the sum is least at `sigmoid(x) = min(1, p_e / p_a)`: only what the
+    agent shows more often than the expert does loses. With the logarithm of L_F it would be `p_e / (p_e + p_a)`, and
+    the better the agent, the less its successes would get. (Bounded losses for positive and unlabeled data: du Plessis,
+    Niu and Sugiyama, 2014; Kiryo et al., 2017.)
+
+    Args:
+        agent: logits `[N]` of the agent's frames.
+    """
+    return torch.sigmoid(agent.float()).mean()
+
+
+def contrast(anchors: torch.Tensor, positives: torch.Tensor, temperature: float) -> torch.Tensor:
+    """InfoNCE, both ways: each anchor finds its positive among the group's, and each positive its anchor.
+
+    `-log( exp(u_i v_i / tau) / sum_j exp(u_i v_j / tau) )`, averaged over i, both ways and groups.
+
+    L_E: a group holds a frame of each video of a batch, and the positives are another moment of the same videos. Only
+    what stays through an episode, and differs between episodes, tells them apart: where its goal is.
+    L_T: a group holds some moments of one video, and the positives are frames next to them. Only what changes through
+    an episode tells them apart: what the agent moves.
+
+    Args:
+        anchors: u `[..., K, D]`, of length 1.
+        positives: v `[..., K, D]`, likewise.
+        temperature: tau.
+
+    Returns:
+        The loss: log K for projections that say nothing.
+    """
+    similarity = anchors @ positives.transpose(-1, -2) / temperature
+    diagonal = torch.diagonal(similarity, dim1=-2, dim2=-1)
+    ways = (torch.logsumexp(similarity, -1) - diagonal, torch.logsumexp(similarity, -2) - diagonal)
+    return torch.stack(ways).mean()
+
+
+def reward(logits: torch.Tensor, kind: str) -> torch.Tensor:
+    """What a frame gets, float32 of the logits' shape.
+
+    Args:
+        logits: x.
+        kind: chance `sigmoid(x)`, or logit `x / 5`, cut at -1 and 1.
+    """
+    if kind == "chance":
+        return torch.sigmoid(logits.float())
+    return (logits.float() / 5).clamp(-1.0, 1.0)

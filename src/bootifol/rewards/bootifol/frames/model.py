@@ -1,0 +1,219 @@
+"""BootIfOL's reward from single frames (beyond the paper): eyes that learn in the Alignment Phase and then rest, and a
+head that goes on learning on what they see.
+
+A sequence encoder may read motion, and smoothness tells experts from random videos at once; so it never looks at a
+target of two pixels. A single frame has no motion to hide behind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from bootifol.devices import to_host
+from bootifol.errors import BootifolError
+from bootifol.networks.eyes import STATE_SIZE, as_features, rounding
+from bootifol.progress import progress
+from bootifol.rewards.bootifol.frames import losses
+from bootifol.rewards.bootifol.frames.config import FrameConfig
+from bootifol.rewards.bootifol.frames.networks import FrameNetworks, views
+from bootifol.rewards.learned import LearnedRewardModel
+from bootifol.types import Arrays, FeatureSource, Frames, FrameStates, Metrics, Rewards, Video, VideoSource
+
+MOMENTS = 3
+"""Moments of a video in a gradient step of the Alignment Phase; of each, a frame and one next to it."""
+
+NEXT_TO = 2
+"""Farthest frame, in agent steps, that counts as next to another, as in L_triplet."""
+
+RANDOM_FRAMES = 4096
+"""Frames of random videos that are kept for the Interactive Phase."""
+
+EXPERT_FRAMES = 100_000
+"""Most frames of the expert's that are kept so."""
+
+
+class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
+    """The chance that a frame is the expert's, as a head on what the eyes make of it says.
+
+    Args:
+        config: see there.
+        video_size: side of the (square) videos in pixels.
+        seed: of the parameters and of every draw.
+        device: where to compute, as PyTorch names it.
+    """
+
+    keeps_learning = False
+    reference_count = 0
+    feature_size = STATE_SIZE
+
+    def __init__(self, config: FrameConfig, video_size: int, seed: int, device: str = "cpu") -> None:
+        super().__init__(FrameNetworks, config, video_size, seed, device)
+        self._other: VideoSource | None = None
+        self._random: FrameStates | None = None
+        self._expert: FrameStates | None = None
+
+    def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
+        """Alignment Phase: eyes and head learn from the expert's and random videos.
+
+        L = w_F L_F + w_E L_E + w_T L_T.
+        """
+        self._other = other
+        while True:
+            yield self._align_step(expert, other)
+
+    def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:
+        """Interactive Phase: one gradient step of the head. L = L_F + w_B L_B, where L_F tells the expert's frames from
+        random ones and L_B bootstraps the head on the agent's.
+
+        Raises:
+            BootifolError: the agent's videos have no states.
+        """
+        if not isinstance(agent, FeatureSource):
+            raise BootifolError("the reward from single frames learns from the states of the agent's videos")
+        if self._expert is None:
+            self._expert = self._some_states(expert, EXPERT_FRAMES)
+        random = self._random_states()
+        count = self.config.frames_per_class
+        of_random = round(self.config.random_share * count) if len(random) else 0
+        videos = agent.sample_features(count - of_random, self._rng)
+        rows = np.arange(len(videos))
+        of_agent = videos[rows, self._rng.integers(videos.shape[1], size=len(videos))]
+        states = [
+            self._expert[self._rng.integers(len(self._expert), size=count)],
+            of_agent,
+            random[self._rng.integers(max(len(random), 1), size=of_random)],
+        ]
+        features = as_features(self._on_device(np.concatenate(states)))
+        features = features + self.config.noise * self._on_device(
+            self._rng.standard_normal(features.shape, dtype=np.float32)
+        )
+        step = self._begin_step()
+        self._optimizer.param_groups[0]["lr"] = self.config.head_learning_rate
+        logits = self.networks.logits(features)
+        ends = (count, 2 * count - of_random)
+        expert_logits, agent_logits, random_logits = torch.tensor_split(logits, ends)
+        frame = losses.frame_loss(expert_logits, random_logits)
+        bootstrap = losses.bootstrap_loss(agent_logits)
+        terms = {"loss/frame": frame, "loss/bootstrap": bootstrap}
+        metrics = step.take(frame + self.config.agent_weight * bootstrap, terms)
+        self.version += 1
+        return metrics
+
+    def label(self, video: Video, references: Sequence[Video] = ()) -> Rewards:
+        """`r_{t+1}` from the logit of frame t + 1; references are not looked at.
+
+        Raises:
+            BootifolError: the video has another size than the model was made for.
+        """
+        return self.score(self.states_of(video)[1:])
+
+    def score(self, states: FrameStates) -> Rewards:
+        """Rewards float32 `[N]` of frames by their states int8 `[N, Z]`."""
+        with self._evaluating():
+            logits = self.networks.logits(as_features(self._on_device(states)))
+            return to_host(losses.reward(logits, self.config.reward))
+
+    def states(self, frames: Frames) -> FrameStates:
+        """What the eyes make of frames uint8 `[N, S, S, 3]`: int8 `[N, Z]`."""
+        return self.networks.eyes.states(self._checked(frames))
+
+    def with_features(self, video: Video) -> Video:
+        """The video with the states of its frames."""
+        return replace(video, features=self.states_of(video))
+
+    def states_of(self, video: Video) -> FrameStates:
+        """Those that the video has, or computed now; int8 `[T + 1, Z]`."""
+        if video.features is not None and video.features.dtype == np.int8:
+            return video.features  # type: ignore[return-value]
+        return self.states(video.frames)
+
+    def state(self) -> Arrays:
+        """What every reward model has, and the states of random frames that `update` learns from."""
+        return {**super().state(), "random_states": self._random_states()}
+
+    def load_state(self, arrays: Arrays) -> None:
+        """The inverse of `state`."""
+        super().load_state(arrays)
+        self._random = arrays["random_states"].astype(np.int8)
+        self._expert = None
+
+    def _random_states(self) -> FrameStates:
+        """Of frames of random videos, `[N, Z]`; none where there was no Alignment Phase."""
+        if self._random is None:
+            nothing = np.zeros((0, STATE_SIZE), np.int8)
+            self._random = self._some_states(self._other, RANDOM_FRAMES) if self._other else nothing
+        return self._random
+
+    def _some_states(self, videos: VideoSource, most: int) -> FrameStates:
+        """States of all frames `[N, Z]`, or of as many of each video as give `most`."""
+        of_each = min(max(most // len(videos), 1), len(videos[0].frames))
+        kept = np.random.default_rng(0).permutation(len(videos))[:most]
+        states = []
+        with progress("what the eyes see of the videos", len(kept)) as advance:
+            for index in kept:
+                frames = videos[int(index)].frames
+                states.append(self.states(frames[np.linspace(0, len(frames) - 1, of_each).astype(int)]))
+                advance(1)
+        return np.concatenate(states)
+
+    def _align_step(self, expert: VideoSource, other: VideoSource) -> Metrics:
+        config = self.config
+        videos = [self._sample(source, config.videos_per_class) for source in (expert, other)]
+        length = min(of_class.shape[1] for of_class in videos)
+        times = self._draw_times(2 * config.videos_per_class, length)
+        frames = np.stack(
+            [video[at] for video, at in zip([v for of_class in videos for v in of_class], times, strict=True)]
+        )
+        shifted = self._shifted(frames.reshape(-1, *frames.shape[2:]))
+        step = self._begin_step()
+        self._optimizer.param_groups[0]["lr"] = config.learning_rate
+        with self._autocast():
+            seen = self.networks.eyes(self._on_device(shifted)).float()
+        # As coarse as the states that will be kept.
+        states = (seen + rounding(seen, self._rng)).unflatten(0, (len(frames), MOMENTS, 2))
+        of_episode, of_time = views(states)
+        expert_logits, other_logits = self.networks.logits(states).chunk(2)
+        terms = {"frame": losses.frame_loss(expert_logits, other_logits)}
+        if config.episode_weight > 0:
+            moments = of_episode[:, :, 0].transpose(0, 1)
+            terms["episode"] = losses.contrast(moments, moments.roll(1, 0), config.temperature)
+        if config.time_weight > 0:
+            terms["time"] = losses.contrast(of_time[:, :, 0], of_time[:, :, 1], config.temperature)
+        total = torch.stack([getattr(config, f"{name}_weight") * term for name, term in terms.items()]).sum()
+        metrics = step.take(total, {f"loss/{name}": term for name, term in terms.items()})
+        self.version += 1
+        self._expert = self._random = None
+        return metrics
+
+    def _draw_times(self, videos: int, length: int) -> NDArray[np.int64]:
+        """Frames `[videos, 2 * MOMENTS]` of each video: a moment, a frame next to it, the next moment, and so on."""
+        if length < MOMENTS + NEXT_TO:
+            raise BootifolError(
+                f"the videos have {length} frames, but {MOMENTS + NEXT_TO} are needed to tell moments apart; "
+                "use longer videos"
+            )
+        times = np.empty((videos, MOMENTS, 2), np.int64)
+        for of_video in times:
+            of_video[:, 0] = self._rng.choice(length - NEXT_TO, MOMENTS, replace=False)
+        times[..., 1] = times[..., 0] + self._rng.integers(1, NEXT_TO + 1, (videos, MOMENTS))
+        return times.reshape(videos, -1)
+
+    def _shifted(self, frames: Frames) -> Frames:
+        """Frames `[N, S, S, 3]`, each shifted at random by whole pixels, the border replicated."""
+        most = self.config.shift
+        if not most:
+            return frames
+        size = frames.shape[1]
+        padded = np.pad(frames, ((0, 0), (most, most), (most, most), (0, 0)), mode="edge")
+        corners = self._rng.integers(0, 2 * most + 1, (len(frames), 2))
+        return np.stack(
+            [
+                picture[row : row + size, column : column + size]
+                for picture, (row, column) in zip(padded, corners, strict=True)
+            ]
+        )

@@ -1,0 +1,41 @@
+"""The networks of the reward that sees single frames."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import torch
+import torch.nn.functional as F
+from torch import nn
+
+from bootifol.networks.eyes import STATE_SIZE, VIEW, Eyes
+from bootifol.rewards.bootifol.frames.config import FrameConfig
+
+
+class FrameNetworks(nn.Module):
+    """Eyes, and the head that rewards a state.
+
+    Args:
+        config: see there.
+        video_size: the pictures' side in pixels.
+    """
+
+    def __init__(self, config: FrameConfig, video_size: int) -> None:
+        super().__init__()
+        self.eyes = Eyes(video_size, config.channels, config.width)
+        self.head = nn.Sequential(
+            nn.Linear(STATE_SIZE, config.hidden_dim),
+            nn.ReLU(),
+            nn.Linear(config.hidden_dim, config.hidden_dim),
+            nn.ReLU(),
+            nn.Linear(config.hidden_dim, 1),
+        )
+
+    def logits(self, states: torch.Tensor) -> torch.Tensor:
+        """x `[...]` of states `[..., Z]`."""
+        return cast(torch.Tensor, self.head(states)).squeeze(-1)
+
+
+def views(states: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Both halves of states `[..., Z]`, each `[..., 64]` of length 1: what L_E and what L_T contrast."""
+    return F.normalize(states[..., :VIEW], dim=-1), F.normalize(states[..., VIEW:], dim=-1)
