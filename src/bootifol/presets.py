@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 from bootifol.agents.config import DrQv2Config
 from bootifol.demos.augmentation import AugmentationConfig
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.bootifol.frames.config import FrameConfig
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.registry import RewardConfig
@@ -22,13 +23,25 @@ from bootifol.training.config import (
 )
 from bootifol.training.demonstrations import DemonstrationConfig
 
-PresetName = Literal["paper", "cpu", "long", "demo", "drawn", "smoke", "backbone"]
+PresetName = Literal[
+    "paper",
+    "cpu",
+    "long",
+    "demo",
+    "drawn",
+    "smoke",
+    "backbone",
+    "cpu_pixels",
+    "long_pixels",
+    "demo_pixels",
+    "drawn_pixels",
+]
 
 PAPER = TrainingConfig()
 """The paper's hyperparameters, which are the defaults of every field; what the paper leaves open (frame drop, window,
 margin, warm-up, replay) is as in the authors' release (docs/bootifol.md)."""
 
-CPU = TrainingConfig(
+CPU_PIXELS = TrainingConfig(
     pictures=PictureConfig(agent_size=64, video_size=64),
     reward=RewardConfig(
         BootifolConfig(
@@ -91,17 +104,19 @@ CPU = TrainingConfig(
 )
 """The same algorithm with smaller networks, pictures and counts: one to two hours on one core, and 8 GB.
 
-Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
+Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU_PIXELS has:
 `motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `relabel_episodes`, by which stored
 rewards follow it, `saturation_weight`, `ema_decay` and `cloning_weight` of the agent, `demonstrations`, by which the
 policy starts as a clone of the videos, and `augmentation` where these come from files; each is described at its field.
 """
 
-LONG = replace(
-    CPU,
-    agent=replace(CPU.agent, encoder="coarse", batch_size=64, update_every=10, replay_capacity=100_000),
-    interactive=replace(CPU.interactive, agent_steps=1_550_000, reward_updates_until=60_000),
-    evaluation=replace(CPU.evaluation, every=25_000),
+LONG_PIXELS = replace(
+    CPU_PIXELS,
+    agent=replace(
+        CPU_PIXELS.agent, encoder="coarse", batch_size=64, update_every=10, replay_capacity=100_000
+    ),
+    interactive=replace(CPU_PIXELS.interactive, agent_steps=1_550_000, reward_updates_until=60_000),
+    evaluation=replace(CPU_PIXELS.evaluation, every=25_000),
 )
 """`cpu` with an evening's time: the paper's 1.55M agent steps in about two and a half hours of one core, with smaller
 updates and fewer of them (docs/performance.md)."""
@@ -116,28 +131,32 @@ BACKBONE = TrainingConfig(
 one N_train for everything, 375K; the authors' released configurations stop the encoders earlier, after 60K (Button
 Press), 112.5K (Plate Slide) and 350K agent steps (Drawer Close): `--interactive.reward-updates-until`."""
 
-DEMO = replace(
-    CPU,
-    agent=replace(CPU.agent, replay_capacity=20_000),
+DEMO_PIXELS = replace(
+    CPU_PIXELS,
+    agent=replace(CPU_PIXELS.agent, replay_capacity=20_000),
     alignment=AlignmentConfig(gradient_steps=500, time_share=0.25),
-    interactive=replace(CPU.interactive, agent_videos=300),
-    demonstrations=replace(CPU.demonstrations, inverse_dynamics_updates=1500, cloning_updates=4000, phases=1),
+    interactive=replace(CPU_PIXELS.interactive, agent_videos=300),
+    demonstrations=replace(
+        CPU_PIXELS.demonstrations, inverse_dynamics_updates=1500, cloning_updates=4000, phases=1
+    ),
     evaluation=EvaluationConfig(every=2500, long_episodes=1, final_episodes=10),
     checkpoint_minutes=5.0,
 )
 """For `make demo`: `cpu` in minutes."""
 
-DRAWN = replace(
-    CPU,
+DRAWN_PIXELS = replace(
+    CPU_PIXELS,
     pictures=PictureConfig(agent_size=32, video_size=32, stack=2),
     reward=RewardConfig(
-        replace(CPU.reward.bootifol, width_divisor=8),
-        virl=replace(CPU.reward.virl, width_divisor=8),
-        context_translation=replace(CPU.reward.context_translation, width_divisor=8, image_weight=0.28),
-        gaifo=replace(CPU.reward.gaifo, width_divisor=8),
+        replace(CPU_PIXELS.reward.bootifol, width_divisor=8),
+        virl=replace(CPU_PIXELS.reward.virl, width_divisor=8),
+        context_translation=replace(
+            CPU_PIXELS.reward.context_translation, width_divisor=8, image_weight=0.28
+        ),
+        gaifo=replace(CPU_PIXELS.reward.gaifo, width_divisor=8),
     ),
     agent=replace(
-        CPU.agent,
+        CPU_PIXELS.agent,
         hidden_dim=128,
         batch_size=64,
         warm_up_steps=600,
@@ -167,17 +186,17 @@ with nothing cloned. The learning test runs it. N_train is the share of the pape
 four here (docs/results/drawn_home.md)."""
 
 SMOKE = replace(
-    CPU,
+    CPU_PIXELS,
     reward=RewardConfig(
-        replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4),
-        virl=replace(CPU.reward.virl, width_divisor=16, videos_per_class=4),
+        replace(CPU_PIXELS.reward.bootifol, width_divisor=16, videos_per_class=4),
+        virl=replace(CPU_PIXELS.reward.virl, width_divisor=16, videos_per_class=4),
         context_translation=replace(
-            CPU.reward.context_translation, width_divisor=16, pairs=4, image_weight=0.035
+            CPU_PIXELS.reward.context_translation, width_divisor=16, pairs=4, image_weight=0.035
         ),
-        gaifo=replace(CPU.reward.gaifo, width_divisor=16, videos_per_class=4),
+        gaifo=replace(CPU_PIXELS.reward.gaifo, width_divisor=16, videos_per_class=4),
     ),
     agent=replace(
-        CPU.agent,
+        CPU_PIXELS.agent,
         hidden_dim=64,
         batch_size=32,
         warm_up_steps=240,
@@ -186,16 +205,90 @@ SMOKE = replace(
     ),
     alignment=AlignmentConfig(gradient_steps=60, log_every=5),
     interactive=replace(
-        CPU.interactive, agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150
+        CPU_PIXELS.interactive, agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150
     ),
     demonstrations=replace(
-        CPU.demonstrations, videos=20, inverse_dynamics_updates=30, cloning_updates=30, phases=1
+        CPU_PIXELS.demonstrations, videos=20, inverse_dynamics_updates=30, cloning_updates=30, phases=1
     ),
     evaluation=EvaluationConfig(
         every=450, episodes=1, long_episodes=1, final_episodes=2, held_out_videos=6, showcase_episodes=2
     ),
 )
 """Every stage in under two minutes. It learns nothing worth having."""
+
+
+def _seeing(pixels: TrainingConfig, frames: FrameConfig, **agent: Any) -> TrainingConfig:
+    """The same with a reward from single frames, whose eyes the agent shares."""
+    return replace(
+        pixels,
+        reward=replace(
+            pixels.reward, bootifol=replace(pixels.reward.bootifol, reward="frames", frames=frames)
+        ),
+        agent=replace(
+            pixels.agent,
+            observations="states",
+            critic_norm=True,
+            feature_dim=64,
+            precision="fp32",
+            cloning_weight=0.0,
+            ema_decay=0.0,
+            exploration_start=1.0,
+            **agent,
+        ),
+        demonstrations=DemonstrationConfig(),
+    )
+
+
+CPU = _seeing(
+    CPU_PIXELS,
+    FrameConfig(),
+    hidden_dim=256,
+    batch_size=256,
+    learning_rate=3e-4,
+    exploration_steps=30_000,
+    replay_capacity=300_000,
+)
+CPU = replace(
+    CPU,
+    alignment=AlignmentConfig(gradient_steps=900),
+    interactive=InteractiveConfig(
+        agent_steps=300_000, reward_update_every=8, reward_updates_until=300_000, agent_videos=1000
+    ),
+    evaluation=EvaluationConfig(every=20_000, long_episodes=5, final_episodes=50),
+)
+"""BootIfOL with a reward from single frames, and an agent that reads what its eyes make of them: nothing is cloned."""
+
+LONG = replace(
+    CPU,
+    interactive=replace(CPU.interactive, agent_steps=1_550_000, reward_updates_until=1_550_000),
+    agent=replace(CPU.agent, update_every=4),
+    evaluation=replace(CPU.evaluation, every=50_000),
+)
+"""`cpu` for an evening: the paper's 1.55M agent steps."""
+
+DEMO = replace(
+    CPU,
+    interactive=replace(CPU.interactive, agent_steps=60_000, reward_updates_until=60_000),
+    evaluation=EvaluationConfig(every=10_000, long_episodes=2, final_episodes=10),
+    checkpoint_minutes=5.0,
+)
+"""For `make demo`: `cpu` in minutes."""
+
+DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(), exploration_steps=6000, batch_size=64)
+DRAWN = replace(
+    DRAWN,
+    alignment=AlignmentConfig(gradient_steps=600, time_share=0.25),
+    interactive=InteractiveConfig(
+        agent_steps=16_000,
+        reward_update_every=8,
+        reward_updates_until=16_000,
+        agent_videos=300,
+        log_every=500,
+    ),
+    evaluation=replace(DRAWN.evaluation, every=2000),
+)
+"""For the tasks drawn with numpy, at 32 pixels: a policy from videos in minutes, without a simulator and with nothing
+cloned. The learning test runs it."""
 
 PRESETS: dict[PresetName, TrainingConfig] = {
     "paper": PAPER,
@@ -205,15 +298,29 @@ PRESETS: dict[PresetName, TrainingConfig] = {
     "drawn": DRAWN,
     "smoke": SMOKE,
     "backbone": BACKBONE,
+    "cpu_pixels": CPU_PIXELS,
+    "long_pixels": LONG_PIXELS,
+    "demo_pixels": DEMO_PIXELS,
+    "drawn_pixels": DRAWN_PIXELS,
 }
 
 
-def preset(name: str) -> TrainingConfig:
+SEEING_METHODS = ("bootifol", "environment")
+"""Methods whose reward has eyes that an agent can share."""
+
+
+def preset(name: str, method: str = "bootifol") -> TrainingConfig:
     """Looks a preset up.
+
+    Args:
+        name: of the preset.
+        method: whose run it is for. One whose reward has no eyes gets `NAME_pixels` instead, where there is one.
 
     Raises:
         BootifolError: there is none of that name.
     """
+    if method not in SEEING_METHODS and f"{name}_pixels" in PRESETS:
+        name = f"{name}_pixels"
     for known, config in PRESETS.items():
         if known == name:
             return config

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from bootifol.agents.config import EncoderName, Precision
-from bootifol.agents.networks import Encoder
+from bootifol.agents.networks import Encoder, StateEncoder
 from bootifol.devices import to_device, to_host
 from bootifol.gradient_step import take_step
 from bootifol.module_state import load_module_state, module_state
-from bootifol.types import Arrays, Batch, Frames, StepMetrics
+from bootifol.types import Arrays, Batch, Frames, FrameStates, StepMetrics
 
 
 class InverseDynamics:
@@ -32,6 +32,7 @@ class InverseDynamics:
         hidden_dim: width of the two hidden layers.
         precision: of convolutions and matrix products; parameters and the loss are float32.
         device: where to compute, as PyTorch names it.
+        state_size: Z, where it reads states of frames instead of pictures; `encoder` and `frame_size` mean nothing then.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class InverseDynamics:
         hidden_dim: int = 512,
         precision: Precision = "bf16",
         device: str = "cpu",
+        state_size: int = 0,
     ) -> None:
         self.stack, self.n_step = stack, n_step
         self._dtype = torch.bfloat16 if precision == "bf16" else torch.float32
@@ -52,17 +54,21 @@ class InverseDynamics:
         # PyTorch initializes layers from its global generator, so it is seeded here and given back as it was.
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            convolutions = Encoder(encoder, 6 * stack, frame_size)
+            see: Encoder | StateEncoder = (
+                StateEncoder(2 * stack * state_size)
+                if state_size
+                else Encoder(encoder, 6 * stack, frame_size)
+            )
             self.network = nn.Sequential(
-                convolutions,
-                nn.Linear(convolutions.feature_count, hidden_dim),
+                see,
+                nn.Linear(see.feature_count, hidden_dim),
                 nn.LayerNorm(hidden_dim),
                 nn.ReLU(),
                 nn.Linear(hidden_dim, hidden_dim),
                 nn.ReLU(),
                 nn.Linear(hidden_dim, action_dim),
             )
-        convolutions.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        see.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.network.to(self._device)
         self._optimizer = torch.optim.Adam(self.network.parameters(), fused=True)
 
@@ -86,8 +92,8 @@ class InverseDynamics:
         take_step(self._optimizer, loss, "the inverse dynamics", advice)
         return {"inverse_dynamics/loss": loss.detach()}
 
-    def actions(self, frames: Frames) -> NDArray[np.float32]:
-        """The actions `[T, A]` in [-1, 1] that a video `[T + 1, S, S, 3]` shows."""
+    def actions(self, frames: Frames | FrameStates) -> NDArray[np.float32]:
+        """The actions `[T, A]` in [-1, 1] that a video `[T + 1, S, S, 3]`, or its states `[T + 1, Z]`, shows."""
         steps = len(frames) - 1
         now = np.arange(steps)[:, None]
         back = np.arange(1 - self.stack, 1)
@@ -111,16 +117,20 @@ class InverseDynamics:
         load_module_state(self.network, {"adam": self._optimizer}, arrays, "inverse dynamics")
 
     def _predict(self, before: Tensor, after: Tensor) -> Tensor:
-        """Actions `[B, A]` from two stacks, uint8 `[B, 3 * stack, S, S]` each."""
+        """Actions `[B, A]` from two stacks, uint8 `[B, 3 * stack, S, S]` or int8 `[B, stack * Z]` each."""
         pictures = torch.cat([to_device(stack, self._device) for stack in (before, after)], dim=1)
-        pictures = pictures.to(self._dtype, memory_format=torch.channels_last)
+        if pictures.dtype == torch.uint8:
+            pictures = pictures.to(self._dtype, memory_format=torch.channels_last)
         with torch.autocast(self._device.type, torch.bfloat16, enabled=self._dtype == torch.bfloat16):
             output: Tensor = self.network(pictures)
         return output.float()
 
 
-def _stacked(frames: NDArray[np.uint8]) -> Tensor:
-    """`[T, stack, S, S, 3]` to uint8 `[T, 3 * stack, S, S]`, the oldest frame's channels first."""
+def _stacked(frames: NDArray[np.uint8] | NDArray[np.int8]) -> Tensor:
+    """`[T, stack, S, S, 3]` to uint8 `[T, 3 * stack, S, S]`, the oldest frame's channels first; or `[T, stack, Z]` to
+    int8 `[T, stack * Z]`."""
+    if frames.ndim == 3:
+        return torch.from_numpy(frames.reshape(len(frames), -1))
     steps, stack, height, width, _ = frames.shape
     moved = frames.transpose(0, 1, 4, 2, 3).reshape(steps, 3 * stack, height, width)
     return torch.from_numpy(np.ascontiguousarray(moved))

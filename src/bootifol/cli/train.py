@@ -15,13 +15,17 @@ from bootifol.tasks import short_name
 from bootifol.training.config import TrainingConfig
 
 
-def preset_of(words: list[str]) -> TrainingConfig:
-    """The configuration whose values are the defaults of `train`'s flags, from the `--preset` among `words`."""
+def preset_of(words: Sequence[str]) -> TrainingConfig:
+    """The configuration whose values are the defaults of `train`'s flags, from `--preset` and `--method` among them."""
+    return preset(_value_of("--preset", words, "cpu"), _value_of("--method", words, "bootifol"))
+
+
+def _value_of(flag: str, words: Sequence[str], default: str) -> str:
     for index, word in enumerate(words):
         name, _, value = word.partition("=")
-        if name == "--preset":
-            return preset(value or (words[index + 1] if index + 1 < len(words) else ""))
-    return preset("cpu")
+        if name == flag:
+            return value or (words[index + 1] if index + 1 < len(words) else "")
+    return default
 
 
 def flags_of(words: Sequence[str]) -> list[str]:

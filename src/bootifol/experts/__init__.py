@@ -36,7 +36,7 @@ def make_expert(task_name: str, environment: gymnasium.Env[Any, Any]) -> Act:
     Raises:
         BootifolError: the task has none.
     """
-    controller, _ = _script(task_name, environment)
+    controller, _ = script_of(task_name, environment)
     return lambda observation: controller(None)
 
 
@@ -65,14 +65,14 @@ def make_behavior(behavior: Behavior, task_name: str, environment: gymnasium.Env
         if half_trained.exists():
             policy, simulator = StatePolicy.load(half_trained), _simulator(environment)
             return lambda observation: policy(simulator.state())
-        controller, wrong_goal = _script(task_name, environment)
+        controller, wrong_goal = script_of(task_name, environment)
         return HalfGood(controller, environment, seed, wrong_goal)
     raise BootifolError(
         f"there is no behavior '{behavior}'; choose among expert, half_good, random and still"
     )
 
 
-def _script(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Controller, WrongGoal | None]:
+def script_of(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Controller, WrongGoal | None]:
     """A task's scripted or bundled controller, and how to draw a wrong goal for it, if it can have another."""
     simulator = _simulator(environment)
     bundled = BUNDLED / f"{task_name}.safetensors"

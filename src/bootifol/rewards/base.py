@@ -60,6 +60,19 @@ class RewardModel(Protocol):
     def load_state(self, arrays: Arrays) -> None: ...
 
 
+class Featurizer(Protocol):
+    """A backbone, or a reward model whose eyes rest."""
+
+    @property
+    def feature_size(self) -> int:
+        """F, features of a frame."""
+        ...
+
+    def with_features(self, video: Video) -> Video:
+        """The video with the features of its frames."""
+        ...
+
+
 @runtime_checkable
 class SeesFrames(Protocol):
     """What a reward model also implements whose eyes rest once the agent acts: frames become states once, and agent,

@@ -42,7 +42,7 @@ class EnvironmentRewardModel:
 
 
 class SeeingEnvironmentRewardModel(FrameRewardModel):
-    """The same for an agent that reads states: eyes learn from the videos as BootIfOL's do, the reward is the true one."""
+    """The same for an agent that reads states: eyes learn from the videos as BootIfOL's do, but the reward is true."""
 
     reads_environment_reward = True
 

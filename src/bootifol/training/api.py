@@ -99,7 +99,7 @@ def train_policy(
         seed=seed,
         demos=str(demos),
         time_budget=time_budget,
-        training=config or preset_named(preset),
+        training=config or preset_named(preset, method),
     )
     learner = Run(run, directory, console)
     run.write(directory, list(command))

@@ -43,6 +43,7 @@ def cloning_phase(
         The metrics of each step; a video whose actions and rewards were inferred has none.
     """
     watch = Stopwatch()
+    demonstrations.fill()
     config = demonstrations.config
     inferring = config.inverse_dynamics_updates
     cloning = inferring + len(demonstrations)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -26,7 +26,7 @@ from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import KINDS
 from bootifol.networks.backbones import Backbone
 from bootifol.replay.buffer import ReplayBuffer
-from bootifol.rewards.base import EncodesFrames, RewardModel, SeesFrames
+from bootifol.rewards.base import EncodesFrames, Featurizer, RewardModel, SeesFrames
 from bootifol.rewards.registry import make_backbone, make_reward_model
 from bootifol.tasks import make_environment
 from bootifol.training.checkpoint import Stateful
@@ -49,19 +49,6 @@ class Demos:
     """Videos by kind that the reward never learns from, to see whether it ranks them right."""
     augmentation: AugmentationConfig | None = None
     """How videos vary in looks when the reward learns from them; None where they do not."""
-
-
-class Featurizer(Protocol):
-    """A backbone, or a reward model whose eyes rest."""
-
-    @property
-    def feature_size(self) -> int:
-        """F, features of a frame."""
-        ...
-
-    def with_features(self, video: Video) -> Video:
-        """The video with the features of its frames."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -200,8 +187,11 @@ def demonstrated_videos(run: RunConfig, expert: VideoSource) -> int:
     return min(config.videos, len(expert)) if config.share > 0 else 0
 
 
-def build_demonstrations(run: RunConfig, expert: VideoSource, action_dim: int) -> Demonstrations:
+def build_demonstrations(
+    run: RunConfig, expert: VideoSource, action_dim: int, reward_model: RewardModel
+) -> Demonstrations:
     """Expert videos as experience."""
+    state_size = _state_size(run, reward_model)
     config, agent, pictures = run.training.demonstrations, run.training.agent, run.training.pictures
     count = demonstrated_videos(run, expert)
     replay = ReplayBuffer(
@@ -212,6 +202,7 @@ def build_demonstrations(run: RunConfig, expert: VideoSource, action_dim: int) -
         agent.n_step,
         agent.discount,
         _shift(run),
+        state_size,
     )
     inverse_dynamics = InverseDynamics(
         agent.encoder,
@@ -222,8 +213,10 @@ def build_demonstrations(run: RunConfig, expert: VideoSource, action_dim: int) -
         run.seed,
         precision=agent.precision,
         device=chosen_device(run.training.device),
+        state_size=state_size,
     )
-    return Demonstrations(config, expert, replay, inverse_dynamics, pictures.agent_size, action_dim)
+    sees = reward_model if state_size and isinstance(reward_model, SeesFrames) else None
+    return Demonstrations(config, expert, replay, inverse_dynamics, pictures.agent_size, action_dim, sees)
 
 
 def build_learners(run: RunConfig, environment: gymnasium.Env[Any, Any]) -> Learners:
@@ -268,7 +261,8 @@ def build_components(
         f"the agent's videos {video_bytes / 1e9:.2f} GB ({config.interactive.agent_videos:,} episodes)",
     ]
     if demonstrated:
-        bytes_needed = ReplayBuffer.bytes_needed(demonstrated * len(expert[0].frames), size, action_dim)
+        demonstrated_frames = demonstrated * len(expert[0].frames)
+        bytes_needed = ReplayBuffer.bytes_needed(demonstrated_frames, size, action_dim, state_size)
         parts.append(f"demonstrations {bytes_needed / 1e9:.2f} GB ({demonstrated:,} videos)")
     console.print(f"memory when full: {', '.join(parts)}")
     return Components(
@@ -286,7 +280,7 @@ def build_components(
             state_size,
         ),
         agent_videos=AgentVideos(*ring, failures_share=config.interactive.failures_share),
-        demonstrations=build_demonstrations(run, expert, action_dim) if demonstrated else None,
+        demonstrations=build_demonstrations(run, expert, action_dim, reward_model) if demonstrated else None,
     )
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import cast
 
 import numpy as np
 import torch
@@ -22,10 +23,11 @@ from numpy.typing import NDArray
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.envs.pictures import resize
 from bootifol.errors import fields_of, require_at_least, require_below_one, require_positive, require_share
+from bootifol.progress import progress
 from bootifol.replay.buffer import ReplayBuffer
-from bootifol.rewards.base import RewardModel
+from bootifol.rewards.base import Featurizer, RewardModel
 from bootifol.rewards.references import draw_references
-from bootifol.types import Arrays, Batch, Episode, Frames, StepMetrics, Video, VideoSource
+from bootifol.types import Arrays, Batch, Episode, Frames, FrameStates, StepMetrics, Video, VideoSource
 
 MOVING = 0.1
 """A picture moves where it changes by more than this share of its video's largest change."""
@@ -89,9 +91,10 @@ class Demonstrations:
     Args:
         config: see there; `share` must be above 0.
         expert: D_e.
-        replay: empty, and large enough for the videos; filled here.
+        replay: empty, and large enough for the videos; filled here, or by `fill` where it keeps states.
         inverse_dynamics: what infers the actions.
         frame_size: size of the agent's pictures.
+        featurizer: makes the states of frames, once its eyes rest, where replay keeps them; None otherwise.
     """
 
     def __init__(
@@ -102,26 +105,38 @@ class Demonstrations:
         inverse_dynamics: InverseDynamics,
         frame_size: int,
         action_dim: int,
+        featurizer: Featurizer | None = None,
     ) -> None:
         self.config = config
         self.expert = expert
         self.replay = replay
         self.inverse_dynamics = inverse_dynamics
         self.frame_size = frame_size
-        moving = []
-        for index in range(min(config.videos, len(expert))):
-            video = expert[index]
-            frames = self._at_agent_size(video)
-            steps = len(frames) - 1
-            nothing = np.zeros((steps, action_dim), np.float32)
-            replay.add(Episode(frames, nothing, video, False), np.zeros(steps, np.float32))
-            moving.append(moving_steps(frames))
-        self._moving = np.flatnonzero(np.concatenate(moving))
-        self._still = np.flatnonzero(~np.concatenate(moving))
+        self.featurizer = featurizer
+        self._action_dim = action_dim
+        if featurizer is None:
+            self.fill()
 
     def __len__(self) -> int:
         """Expert videos used."""
-        return len(self.replay.episode_ids)
+        return min(self.config.videos, len(self.expert))
+
+    def fill(self) -> None:
+        """Puts the videos into replay, unless they are there; where replay keeps states, the eyes must rest by then."""
+        if len(self.replay):
+            return
+        moving = []
+        with progress("expert videos as experience", len(self)) as advance:
+            for index in range(len(self)):
+                video = self._video(index)
+                frames = self._at_agent_size(video)
+                steps = len(frames) - 1
+                nothing = np.zeros((steps, self._action_dim), np.float32)
+                self.replay.add(Episode(frames, nothing, video, False), np.zeros(steps, np.float32))
+                moving.append(moving_steps(frames))
+                advance(1)
+        self._moving = np.flatnonzero(np.concatenate(moving))
+        self._still = np.flatnonzero(~np.concatenate(moving))
 
     def learn_inverse_dynamics(
         self, agent_replay: ReplayBuffer, policy_steps: int, rng: np.random.Generator, learning_rate: float
@@ -148,9 +163,10 @@ class Demonstrations:
 
     def infer(self, index: int, reward_model: RewardModel, rng: np.random.Generator) -> None:
         """Gives a video the actions and rewards that inverse dynamics and reward model now see in it."""
-        video = self.expert[index]
+        video = self._video(index)
         rewards = reward_model.label(video, draw_references(reward_model, self.expert, rng))
-        actions = self.inverse_dynamics.actions(self._at_agent_size(video))
+        frames = self._at_agent_size(video) if video.features is None else cast(FrameStates, video.features)
+        actions = self.inverse_dynamics.actions(frames)
         self.replay.relabel(self.replay.episode_ids[index], rewards, actions)
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
@@ -177,8 +193,10 @@ class Demonstrations:
         return replace(Batch(**joined), demonstrated=rows)
 
     def state(self) -> Arrays:
-        """The inverse dynamics, the inferred actions and rewards."""
+        """The inverse dynamics and, once there are any, the inferred actions and rewards."""
         arrays = {f"inverse_dynamics/{name}": array for name, array in self.inverse_dynamics.state().items()}
+        if not len(self.replay):
+            return arrays
         stored = self.replay.state()
         return {
             **arrays,
@@ -187,14 +205,22 @@ class Demonstrations:
         }
 
     def load_state(self, arrays: Arrays) -> None:
-        """Restores what `state` returned; the pictures are the demo set's."""
+        """Restores what `state` returned; the pictures are the demo set's, and eyes must have been restored before."""
         prefix = "inverse_dynamics/"
         self.inverse_dynamics.load_state(
             {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
         )
+        if "actions" not in arrays:
+            return
+        self.fill()
         self.replay.load_state(
             {**self.replay.state(), "actions": arrays["actions"], "rewards": arrays["rewards"]}
         )
+
+    def _video(self, index: int) -> Video:
+        """With its states, where replay keeps them."""
+        video = self.expert[index]
+        return video if self.featurizer is None else self.featurizer.with_features(video)
 
     def _at_agent_size(self, video: Video) -> Frames:
         if video.frames.shape[1] == self.frame_size:

@@ -17,12 +17,11 @@ from bootifol.demos.agent_videos import AgentVideos
 from bootifol.demos.augmentation import AugmentationConfig, augmented
 from bootifol.envs.rollout import EpisodeRecorder, rollout
 from bootifol.replay.buffer import ReplayBuffer
-from bootifol.rewards.base import RewardModel, SeesFrames
+from bootifol.rewards.base import Featurizer, RewardModel, SeesFrames
 from bootifol.rewards.references import draw_references
 from bootifol.tracking import Averages
 from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.cloning import cloning_due
-from bootifol.training.components import Featurizer
 from bootifol.training.config import InteractiveConfig
 from bootifol.training.demonstrations import Demonstrations
 from bootifol.types import Action, Batch, Observation, VideoSource

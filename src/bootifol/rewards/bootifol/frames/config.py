@@ -22,10 +22,10 @@ class FrameConfig:
     time_weight: float = 0.5
     """Weight of L_T, which tells the moments of one video apart. 0 leaves it out."""
 
-    agent_weight: float = 0.5
+    agent_weight: float = 0.2
     """Weight of L_B, by which the agent's frames bootstrap the head in the Interactive Phase."""
 
-    reward: Literal["chance", "logit"] = "chance"
+    reward: Literal["chance", "logit"] = "logit"
     """What rewards a frame of logit x. chance: sigmoid(x), the chance that it is the expert's, in (0, 1). logit: x / 5,
     cut at -1 and 1, which still rises where the head is sure."""
 
