@@ -48,7 +48,7 @@ from bootifol.demos.shards import sha256_of_frames, videos_per_shard, write_shar
 from bootifol.errors import BootifolError, require_at_least
 from bootifol.memory import keep_freed_memory
 from bootifol.networks.frame_encoders import picture_sizes
-from bootifol.presets import preset
+from bootifol.presets import PRESETS, preset
 from bootifol.progress import progress
 from bootifol.reports.markdown import markdown_table
 from bootifol.reports.style import FAINT, RUN_COLORS, RUN_DASHES, house_style, legend_above, save_png
@@ -330,7 +330,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--preset", default="cpu", choices=["cpu", "paper", "drawn", "smoke"])
+    parser.add_argument("--preset", default="cpu_pixels", choices=list(PRESETS))
     parser.add_argument("--threads", type=int, default=torch.get_num_threads())
     parser.add_argument("--runs", type=int, default=3, help="timed runs; quick work gets more")
     parser.add_argument("--panels", nargs="+", choices=list(PANELS), default=list(PANELS))

@@ -31,7 +31,7 @@ from bootifol.rewards.base import RewardModel
 from bootifol.rewards.references import draw_references
 from bootifol.rewards.registry import make_reward_model
 from bootifol.tasks import make_environment, task_named
-from bootifol.types import Rewards, Video
+from bootifol.types import Metrics, Rewards, Video
 
 HEADER = ("task", "reward", "videos", "measure", "value")
 REWARDS = ("bootifol", "sequences", "gaifo", "virl", "context_translation")

@@ -360,10 +360,10 @@ class Suite:
 SEVEN_TASKS = tuple(RETURNS)
 FIVE_SEEDS = (1, 2, 3, 4, 5)
 THREE_SEEDS = (1, 2, 3)
-_ablation = partial(Suite, preset="cpu", tasks=("reacher_hard",), seeds=THREE_SEEDS)
+_ablation = partial(Suite, preset="cpu_pixels", tasks=("reacher_hard",), seeds=THREE_SEEDS)
 
 SUITES = {
-    "reacher": Suite("every system on Reacher Hard", "cpu", ("reacher_hard",), (1,), every_system),
+    "reacher": Suite("every system on Reacher Hard", "cpu_pixels", ("reacher_hard",), (1,), every_system),
     "paper": Suite(
         "the paper's tables: seven tasks, every system, five seeds, the paper's sizes",
         "paper",
@@ -372,11 +372,11 @@ SUITES = {
         every_system,
     ),
     "cpu": Suite(
-        "the same with the preset cpu, about an hour a run", "cpu", SEVEN_TASKS, FIVE_SEEDS, every_system
+        "the same with the preset cpu, about an hour a run", "cpu_pixels", SEVEN_TASKS, FIVE_SEEDS, every_system
     ),
     "backbone": Suite(
         "bootifol from scratch and with a pretrained backbone on Drawer Close",
-        "cpu",
+        "cpu_pixels",
         ("drawer_close",),
         (1,),
         backbone_comparison,
@@ -394,28 +394,28 @@ SUITES = {
     ),
     "drawn": Suite(
         "learning test: every system, and a tutorial's, on a task drawn with numpy, minutes a run",
-        "drawn",
+        "drawn_pixels",
         ("drawn_home",),
         THREE_SEEDS,
         learning_test,
     ),
     "failures": Suite(
         "beyond the paper: bootstrapping on all of the agent's videos, or on those of the lowest learned reward",
-        "drawn",
+        "drawn_pixels",
         ("drawn_home",),
         THREE_SEEDS,
         failures,
     ),
     "remedies": Suite(
         "the preset without one of its departures from the paper, or with one more",
-        "drawn",
+        "drawn_pixels",
         ("drawn_home",),
         THREE_SEEDS,
         remedies,
     ),
     "precision": Suite(
         "what bf16 does to returns: agent and reward in bf16, and in fp32",
-        "drawn",
+        "drawn_pixels",
         ("drawn_home",),
         FIVE_SEEDS,
         precisions,
@@ -423,7 +423,19 @@ SUITES = {
     "smoke": Suite("three runs of seconds, which learn nothing", "smoke", ("drawn_home",), (1,), smallest),
 }
 
-VIDEOS = {"paper": 5032, "cpu": 1000, "long": 1000, "demo": 700, "drawn": 150, "smoke": 12, "backbone": 1532}
+VIDEOS = {
+    "paper": 5032,
+    "backbone": 1532,
+    "cpu": 600,
+    "long": 600,
+    "demo": 600,
+    "drawn": 400,
+    "smoke": 12,
+    "cpu_pixels": 1000,
+    "long_pixels": 1000,
+    "demo_pixels": 700,
+    "drawn_pixels": 150,
+}
 """Expert videos to record for each preset. The paper learns from 5000, with a backbone from 1500; up to 32 are held
 out to see how they rank."""
 

@@ -8,7 +8,7 @@ from benchmarks.rows import read_rows
 
 def test_every_video_is_rewarded_four_times(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "compression.csv"
-    small = ["--preset", "drawn", "--videos", "16", "--held-out", "4", "--gradient-steps", "2"]
+    small = ["--preset", "drawn_pixels", "--videos", "16", "--held-out", "4", "--gradient-steps", "2"]
     words = ["--task", "drawn_home", *small, "--demos", str(tmp_path / "demos"), "--out", str(out)]
     assert main(words) == 0
     rows = read_rows(out, COLUMNS)

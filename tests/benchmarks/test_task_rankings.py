@@ -12,7 +12,7 @@ from bootifol.tasks import TASKS
 
 
 def words(directory: Path, *more: str) -> list[str]:
-    small = ["--preset", "drawn", "--videos", "16", "--held-out", "4", "--gradient-steps", "2"]
+    small = ["--preset", "drawn_pixels", "--videos", "16", "--held-out", "4", "--gradient-steps", "2"]
     places = ["--demos", str(directory / "demos"), "--out", str(directory / "rankings.csv")]
     return ["--tasks", "drawn_home", *small, *places, *more]
 

@@ -17,7 +17,7 @@ from bootifol.demos.record import record_demos
 from bootifol.envs.rollout import Act
 from bootifol.evaluation.returns import evaluate
 from bootifol.experts import make_random
-from bootifol.presets import DRAWN
+from bootifol.presets import DRAWN_PIXELS
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.tasks import make_environment, task_named
 from bootifol.training.run_config import RunConfig
@@ -25,7 +25,7 @@ from bootifol.training.train import Run
 from bootifol.types import Rewards, Video
 
 TASK = "drawn_home"
-CONFIG = replace(DRAWN, threads=1, tensorboard=False, evaluation=replace(DRAWN.evaluation, every=10**9))
+CONFIG = replace(DRAWN_PIXELS, threads=1, tensorboard=False, evaluation=replace(DRAWN_PIXELS.evaluation, every=10**9))
 PICTURES = CONFIG.pictures
 
 
@@ -51,7 +51,7 @@ class ShuffledReward(BootifolRewardModel):
 
 
 def new_run(demos: Path, directory: Path, seed: int = 1) -> Run:
-    run = RunConfig(TASK, "bootifol", "drawn", seed, str(demos), None, CONFIG)
+    run = RunConfig(TASK, "bootifol", "drawn_pixels", seed, str(demos), None, CONFIG)
     return Run(run, directory, Console(quiet=True))
 
 

@@ -10,10 +10,10 @@ import pytest
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.record import record_demos
 from bootifol.evaluation.ranking import area_under_curve, rank_videos
-from bootifol.presets import DRAWN
+from bootifol.presets import DRAWN_PIXELS
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 
-PICTURES = DRAWN.pictures
+PICTURES = DRAWN_PIXELS.pictures
 
 
 @pytest.mark.parametrize(("shown", "other"), [("expert", "random"), ("random", "expert")])
@@ -25,7 +25,7 @@ def test_the_learned_reward_prefers_what_the_videos_show(tmp_path: Path, shown: 
     for kind in (shown, other):
         sources[kind], aside = DemoSet.open(tmp_path / kind).split(24)
         unseen[kind] = [aside[index] for index in range(len(aside))]
-    model = BootifolRewardModel(DRAWN.reward.bootifol, PICTURES.video_size, seed=1)
+    model = BootifolRewardModel(DRAWN_PIXELS.reward.bootifol, PICTURES.video_size, seed=1)
     steps = model.align(sources[shown], sources[other])
     for _ in range(120):
         next(steps)

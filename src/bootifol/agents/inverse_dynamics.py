@@ -32,7 +32,7 @@ class InverseDynamics:
         hidden_dim: width of the two hidden layers.
         precision: of convolutions and matrix products; parameters and the loss are float32.
         device: where to compute, as PyTorch names it.
-        state_size: Z, where it reads states of frames instead of pictures; `encoder` and `frame_size` mean nothing then.
+        state_size: Z, where it reads states of frames instead of pictures, and `encoder` and `frame_size` say nothing.
     """
 
     def __init__(

@@ -69,8 +69,9 @@ def perform(
 def sight(performances: Sequence[Performance]) -> Metrics:
     """What the performances say, by name.
 
-    `auc:KIND`: the chance that an episode of the expert is rewarded above one of that kind, for kinds that fail: whose
-    mean true return is at most halfway from the worst kind's to the expert's. `spearman`: rank correlation of learned
+    `auc:KIND`: the chance that an episode of the expert is rewarded above one of that kind that failed: whose true
+    return is at most halfway from the worst kind's to the expert's. Kinds that fail in fewer than a quarter of their
+    episodes are left out. `spearman`: rank correlation of learned
     and true return over all episodes. `step_auc`, where the true reward of a step takes few values, half of them or
     more 0: the chance that a step with half of the highest or more is rewarded above one with none.
     """
@@ -79,11 +80,11 @@ def sight(performances: Sequence[Performance]) -> Metrics:
     kinds = list(dict.fromkeys(names))
     means = {kind: float(true[names == kind].mean()) for kind in kinds}
     halfway = (means["expert"] + min(means.values())) / 2
-    figures = {
-        f"auc:{kind}": area_under_curve(learned[names == "expert"], learned[names == kind])
-        for kind in kinds
-        if kind != "expert" and means[kind] <= halfway
-    }
+    figures = {}
+    for kind in kinds:
+        failed = (names == kind) & (true <= halfway)
+        if kind != "expert" and failed.sum() >= (names == kind).sum() / 4:
+            figures[f"auc:{kind}"] = area_under_curve(learned[names == "expert"], learned[failed])
     rank = float(stats.spearmanr(learned, true).statistic)
     figures["spearman"] = rank if np.isfinite(rank) else 0.0  # undefined where all rewards are equal
     steps = np.concatenate([performance.true_rewards for performance in performances])
