@@ -372,7 +372,11 @@ SUITES = {
         every_system,
     ),
     "cpu": Suite(
-        "the same with the preset cpu, about an hour a run", "cpu_pixels", SEVEN_TASKS, FIVE_SEEDS, every_system
+        "the same with the preset cpu, about an hour a run",
+        "cpu_pixels",
+        SEVEN_TASKS,
+        FIVE_SEEDS,
+        every_system,
     ),
     "backbone": Suite(
         "bootifol from scratch and with a pretrained backbone on Drawer Close",

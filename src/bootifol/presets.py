@@ -211,7 +211,13 @@ SMOKE = replace(
         CPU_PIXELS.demonstrations, videos=20, inverse_dynamics_updates=30, cloning_updates=30, phases=1
     ),
     evaluation=EvaluationConfig(
-        every=450, episodes=1, long_episodes=1, final_episodes=2, held_out_videos=6, showcase_episodes=2
+        every=450,
+        episodes=1,
+        long_episodes=1,
+        final_episodes=2,
+        held_out_videos=6,
+        showcase_episodes=2,
+        sight_episodes=1,
     ),
 )
 """Every stage in under two minutes. It learns nothing worth having."""

@@ -94,7 +94,9 @@ def test_videos_of_another_size_are_recorded_apart(
         return subprocess.CompletedProcess(command, 0)
 
     monkeypatch.setattr(subprocess, "run", record_nothing)
-    small, large = (PlannedRun("drawn_home", "cpu_pixels", system, 1) for system in backbone_comparison(CPU_PIXELS, False))
+    small, large = (
+        PlannedRun("drawn_home", "cpu_pixels", system, 1) for system in backbone_comparison(CPU_PIXELS, False)
+    )
     assert cost.videos_of(small, tmp_path, tmp_path / "spare") == tmp_path / "drawn_home"
     assert not recorded
     assert cost.videos_of(large, tmp_path, tmp_path / "spare") == tmp_path / "spare" / "drawn_home-224"

@@ -144,7 +144,12 @@ def test_encoder_training_lengths_are_the_papers_or_the_same_shares() -> None:
     lengths = (0, 100_000, 375_000, 1_550_000)
     assert [equivalent_steps(PAPER, length, timed=False) for length in lengths] == list(lengths)
     # 24,000 of cpu's 30,000 steps follow its warm-up: 24,000 * (100,000 - 1920) / (1,550,000 - 1920) = 1521
-    assert [equivalent_steps(CPU_PIXELS, length, timed=False) for length in lengths] == [0, 7521, 11_784, 30_000]
+    assert [equivalent_steps(CPU_PIXELS, length, timed=False) for length in lengths] == [
+        0,
+        7521,
+        11_784,
+        30_000,
+    ]
     assert equivalent_steps(CPU_PIXELS, 375_000, timed=True) == round(30_000 * 375 / 1550)
 
 
@@ -183,7 +188,9 @@ def test_a_method_of_ones_own_stands_beside_the_others() -> None:
 
 
 def test_a_remedy_is_taken_away_from_the_preset_and_cloning_only_where_there_is_some() -> None:
-    drawn, cpu = ({run.system.variant: run for run in runs_of_remedies(name)} for name in ("drawn_pixels", "cpu_pixels"))
+    drawn, cpu = (
+        {run.system.variant: run for run in runs_of_remedies(name)} for name in ("drawn_pixels", "cpu_pixels")
+    )
     assert cpu.keys() - drawn.keys() == {"nothing_cloned"}
     assert drawn["rewards_stored_once"].config.interactive.relabel_episodes == 0
     agent = cpu["nothing_cloned"].config.agent
@@ -203,7 +210,10 @@ def test_two_precisions_differ_in_the_arithmetic_of_agent_and_reward_alone() -> 
 
 
 def test_a_preset_that_clones_shows_what_cloning_alone_brings() -> None:
-    names = {name: [system.name for system in every_system(preset(name), False)] for name in ("cpu_pixels", "drawn_pixels")}
+    names = {
+        name: [system.name for system in every_system(preset(name), False)]
+        for name in ("cpu_pixels", "drawn_pixels")
+    }
     assert set(names["cpu_pixels"]) - set(names["drawn_pixels"]) == {"bootifol-cloning_alone"}
     environment = next(system for system in every_system(CPU_PIXELS, False) if system.method == "environment")
     assert with_overrides(CPU_PIXELS, environment.overrides).agent.exploration(10_000) > 0.5

@@ -25,7 +25,9 @@ from bootifol.training.train import Run
 from bootifol.types import Rewards, Video
 
 TASK = "drawn_home"
-CONFIG = replace(DRAWN_PIXELS, threads=1, tensorboard=False, evaluation=replace(DRAWN_PIXELS.evaluation, every=10**9))
+CONFIG = replace(
+    DRAWN_PIXELS, threads=1, tensorboard=False, evaluation=replace(DRAWN_PIXELS.evaluation, every=10**9)
+)
 PICTURES = CONFIG.pictures
 
 

@@ -11,6 +11,7 @@ from rich.console import Console
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.presets import SMOKE
+from bootifol.rewards.bootifol.frames.config import FrameConfig
 from bootifol.rewards.registry import METHODS, RewardConfig
 from bootifol.training.config import AlignmentConfig, InteractiveConfig, TrainingConfig
 from bootifol.training.demonstrations import DemonstrationConfig
@@ -75,6 +76,21 @@ ENCODING_BASED = replace(
 )
 """The same, with an agent that sees the reward model's encodings instead of pictures."""
 
+SEEING = replace(
+    WITH_DEMONSTRATIONS,
+    reward=replace(
+        TINY.reward,
+        bootifol=replace(
+            TINY.reward.bootifol,
+            reward="frames",
+            frames=FrameConfig(videos_per_class=2, frames_per_class=8, channels=2, width=4, hidden_dim=8),
+        ),
+    ),
+    agent=replace(WITH_DEMONSTRATIONS.agent, observations="states", critic_norm=True, ema_decay=0.9),
+    interactive=replace(TINY.interactive, relabel_every=2),
+)
+"""The same with a reward from single frames and an agent that reads states."""
+
 ENDS_SOON = replace(
     TINY,
     agent=replace(TINY.agent, ema_decay=0.9, warm_up_steps=30),
@@ -85,6 +101,7 @@ ENDS_SOON = replace(
 RUNS = [
     pytest.param("bootifol", TINY, id="paper"),
     pytest.param("bootifol", ENCODING_BASED, id="encoding_based"),
+    pytest.param("bootifol", SEEING, id="frames"),
     *(pytest.param(method, WITH_DEMONSTRATIONS, id=method) for method in METHODS),
 ]
 """Method and configuration of what must hold for every method: cloning asks the reward for more than acting does."""

@@ -105,6 +105,8 @@ def returns(performances: Sequence[Performance]) -> tuple[NDArray[np.float64], N
 def in_words(figures: Metrics) -> str:
     """One sentence: the failure that the reward tells worst from the expert, and the rank correlation."""
     against = {name.removeprefix("auc:"): value for name, value in figures.items() if name.startswith("auc:")}
+    if not against:
+        return f"nobody failed at this task; Spearman with the true return {figures['spearman']:.2f}"
     worst = min(against, key=against.__getitem__)
     on_target = (
         f", a step on the target above one off it {figures['step_auc']:.0%}" if "step_auc" in figures else ""

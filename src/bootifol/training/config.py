@@ -104,6 +104,10 @@ class EvaluationConfig:
     held_out_videos: int = 32
     """Expert videos that the reward never learns from, kept to see whether it ranks them right."""
 
+    sight_episodes: int = 8
+    """Episodes of the expert, and of each kind of plausible failure, by which the learned reward is judged after
+    alignment and at the end (docs/frames.md); 0 for none. Only for tasks of the catalogue that have an expert."""
+
     showcase_episodes: int = 3
     """Starts from which expert, agent and random play for the report's videos and film strips."""
 
@@ -111,6 +115,7 @@ class EvaluationConfig:
         require_at_least(1, every=self.every, final_episodes=self.final_episodes)
         require_at_least(0, episodes=self.episodes, long_episodes=self.long_episodes)
         require_at_least(0, held_out_videos=self.held_out_videos, showcase_episodes=self.showcase_episodes)
+        require_at_least(0, sight_episodes=self.sight_episodes)
 
 
 @dataclass(frozen=True)

@@ -19,14 +19,16 @@ from bootifol.evaluation.ranking import (
 )
 from bootifol.evaluation.returns import evaluate, evaluation_rows, evaluation_seeds
 from bootifol.evaluation.showcase import play_showcase, write_showcase
+from bootifol.evaluation.sight import in_words, perform, sight
 from bootifol.evaluation.summary import summarize
 from bootifol.evaluation.tables import append_evaluations, append_ranking
 from bootifol.experts import make_expert, make_random
 from bootifol.progress import progress
+from bootifol.rewards.references import draw_references
 from bootifol.training.budget import Budget, Counters
 from bootifol.training.components import Components, Demos, build_environment, reference_rng
 from bootifol.training.run_config import RunConfig
-from bootifol.types import Action, Metrics, Observation, Video
+from bootifol.types import Action, Metrics, Observation, Rewards, Video
 
 
 class Measurements:
@@ -123,6 +125,7 @@ class Measurements:
         if len(agent_videos):
             count = self._config.held_out_videos
             videos["agent"] = agent_videos.newest(count)
+        sees = self._sight()
         rows = rank_videos(
             self._components.reward_model,
             videos,
@@ -134,6 +137,8 @@ class Measurements:
         if all(kind in videos for kind in KINDS):
             scores = ranking_scores(rows)
             self._log(self._counters.agent_steps, scores.metrics())
+            if sees:
+                return
             self._console.print(
                 f"the learned reward on held-out videos: Kendall's tau {scores.kendall_tau:.2f} (a perfect order has "
                 f"{scores.perfect_tau:.2f}), expert above half-good {scores.expert_above_half_good:.0%}, half-good "
@@ -142,7 +147,29 @@ class Measurements:
         elif {"expert", "random"} <= videos.keys():
             above = expert_above_random(rows)
             self._log(self._counters.agent_steps, {EXPERT_ABOVE_RANDOM: above})
+            if sees:
+                return
             self._console.print(f"the learned reward on held-out videos: expert above random {above:.0%}")
+
+    def _sight(self) -> bool:
+        """Whether the learned reward sees the task, logged and told, where someone can play for it.
+
+        Returns:
+            False where nobody can: for tasks without an expert, or where no episodes are wanted.
+        """
+        episodes = self._config.sight_episodes
+        if not (episodes and self._task.has_expert):
+            return False
+        model, expert = self._components.reward_model, self._demos.expert
+        rng = reference_rng(self._run.seed, self._counters.agent_steps)
+
+        def label(video: Video) -> Rewards:
+            return model.label(video, draw_references(model, expert, rng))
+
+        figures = sight(list(perform(self._run.task, self._environment, label, episodes)))
+        self._log(self._counters.agent_steps, {f"sight/{name}": value for name, value in figures.items()})
+        self._console.print(in_words(figures))
+        return True
 
     def showcase(self) -> None:
         """Expert, agent and random from the same starts, with the reward along them, for the report."""

@@ -1,0 +1,145 @@
+"""The reward from single frames: it sees what motion hides, and goes on learning without its eyes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from bootifol.demos.agent_videos import AgentVideos
+from bootifol.errors import BootifolError
+from bootifol.rewards.bootifol.frames.config import FrameConfig
+from bootifol.rewards.bootifol.frames.model import FrameRewardModel
+from bootifol.types import FrameBatch, Video
+
+SIZE, FRAMES = 32, 12
+SMALL = FrameConfig(videos_per_class=8, frames_per_class=32, width=16, channels=8, hidden_dim=32)
+
+
+class Reaches:
+    """A dot that glides to a target (`to_target`) or, as smoothly, to another place; the target is elsewhere in each."""
+
+    def __init__(self, name: str, to_target: bool, count: int = 48, seed: int = 3) -> None:
+        rng = np.random.default_rng(seed)
+        self.name = name
+        self.videos = np.full((count, FRAMES, SIZE, SIZE, 3), 20, np.uint8)
+        for video in self.videos:
+            target, start, elsewhere = (rng.integers(2, SIZE - 5, 2) for _ in range(3))
+            while np.abs(elsewhere - target).max() < 8:
+                elsewhere = rng.integers(2, SIZE - 5, 2)
+            goal = target if to_target else elsewhere
+            for t, frame in enumerate(video):
+                _paint(frame, target, (200, 60, 60), 4)
+                share = min(t / 6, 1.0)
+                _paint(frame, np.round(start + share * (goal - start)).astype(int), (240, 230, 150), 3)
+
+    def __len__(self) -> int:
+        return len(self.videos)
+
+    def __getitem__(self, index: int) -> Video:
+        return Video(f"{self.name}-{index}", self.videos[index])
+
+    def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
+        return self.videos[rng.choice(len(self.videos), count, replace=count > len(self.videos))]
+
+
+def _paint(frame: NDArray[np.uint8], corner: NDArray[np.int64], color: tuple[int, int, int], side: int) -> None:
+    frame[corner[0] : corner[0] + side, corner[1] : corner[1] + side] = color
+
+
+EXPERT, OTHER = Reaches("expert", True), Reaches("other", False, seed=4)
+
+
+def aligned(steps: int, config: FrameConfig = SMALL, seed: int = 1) -> FrameRewardModel:
+    model = FrameRewardModel(config, SIZE, seed)
+    metrics = model.align(EXPERT, OTHER)
+    for _ in range(steps):
+        next(metrics)
+    return model
+
+
+@pytest.fixture(scope="module")
+def trained() -> FrameRewardModel:
+    return aligned(160)
+
+
+def test_it_sees_a_target_that_no_motion_tells(trained: FrameRewardModel) -> None:
+    """Both classes glide alike: what tells them apart is where the dot comes to rest."""
+    unseen = [Reaches(f"unseen-{kind}", kind, 32, seed=9) for kind in (True, False)]
+    right, wrong = ([float(trained.label(of[i])[-5:].mean()) for i in range(32)] for of in unseen)
+    above = np.mean([a > b for a in right for b in wrong])
+    assert above > 0.9
+
+
+def test_a_reward_is_of_its_frame_alone(trained: FrameRewardModel) -> None:
+    video = EXPERT[0]
+    changed = video.frames.copy()
+    changed[5] = 255
+    before, after = trained.label(video), trained.label(Video("changed", changed))
+    assert before.shape == (FRAMES - 1,) and before.dtype == np.float32
+    assert np.flatnonzero(before != after).tolist() == [4]
+
+
+def test_states_are_enough(trained: FrameRewardModel) -> None:
+    video = trained.with_features(EXPERT[1])
+    assert video.features is not None and video.features.dtype == np.int8
+    without_pixels = Video("states", np.empty((FRAMES, 0, 0, 3), np.uint8), features=video.features)
+    assert np.array_equal(trained.label(without_pixels), trained.label(EXPERT[1]))
+    scores = trained.score(trained.states(EXPERT[1].frames))[1:]
+    assert np.allclose(scores, trained.label(EXPERT[1]), atol=1e-5)
+
+
+def agents_videos(model: FrameRewardModel, videos: Reaches) -> AgentVideos:
+    ring = AgentVideos(len(videos), FRAMES, SIZE, model.feature_size, feature_bytes=1)
+    for index in range(len(videos)):
+        ring.add(model.with_features(videos[index]))
+    return ring
+
+
+def test_the_agents_failures_lose_and_eyes_rest() -> None:
+    model = aligned(100)
+    holes = Reaches("hole", False, 16, seed=11)
+    ring = agents_videos(model, holes)
+    seen = model.states(EXPERT[0].frames)
+    before = np.mean([model.label(holes[i]).mean() for i in range(16)])
+    config = replace(SMALL, agent_weight=1.0)
+    model.config = config
+    for _ in range(60):
+        metrics = model.update(EXPERT, ring)
+    after = np.mean([model.label(holes[i]).mean() for i in range(16)])
+    assert after < before - 0.05
+    assert np.array_equal(model.states(EXPERT[0].frames), seen), "the eyes do not learn any more"
+    assert set(metrics) == {"loss/frame", "loss/bootstrap", "loss/total"}
+
+
+def test_it_goes_on_bit_for_bit_from_what_it_stored() -> None:
+    whole = aligned(6)
+    rest = FrameRewardModel(SMALL, SIZE, seed=5)
+    rest.load_state({name: array.copy() for name, array in whole.state().items()})
+    ring = agents_videos(whole, OTHER)
+    for _ in range(3):
+        assert whole.update(EXPERT, ring) == rest.update(EXPERT, ring)
+    for name, array in whole.state().items():
+        assert np.array_equal(array, rest.state()[name]), name
+
+
+def test_the_global_random_state_is_left_alone() -> None:
+    torch.manual_seed(3)
+    expected = torch.randn(2)
+    torch.manual_seed(3)
+    aligned(1)
+    assert torch.equal(torch.randn(2), expected)
+
+
+def test_videos_too_short_or_without_states_are_refused(trained: FrameRewardModel) -> None:
+    class Short(Reaches):
+        def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
+            return super().sample(count, rng)[:, :4]
+
+    with pytest.raises(BootifolError, match="have 4 frames, but 5 are needed"):
+        next(trained.align(Short("short", True), OTHER))
+    with pytest.raises(BootifolError, match="learns from the states of the agent's videos"):
+        trained.update(EXPERT, OTHER)
