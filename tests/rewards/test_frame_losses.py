@@ -36,7 +36,9 @@ def test_contrast_of_groups_is_the_mean_over_groups() -> None:
     assert float(losses.contrast(u, v, 0.1)) == pytest.approx(sum(by_group) / 3, rel=1e-5)
 
 
-@pytest.mark.parametrize(("of_expert", "of_agent", "least"), [(0.2, 0.8, 0.25), (0.5, 0.5, 1.0), (0.6, 0.3, 1.0)])
+@pytest.mark.parametrize(
+    ("of_expert", "of_agent", "least"), [(0.2, 0.8, 0.25), (0.5, 0.5, 1.0), (0.6, 0.3, 1.0)]
+)
 def test_the_agents_frames_lose_only_what_they_show_more_often_than_the_expert(
     of_expert: float, of_agent: float, least: float
 ) -> None:

@@ -20,7 +20,7 @@ SMALL = FrameConfig(videos_per_class=8, frames_per_class=32, width=16, channels=
 
 
 class Reaches:
-    """A dot that glides to a target (`to_target`) or, as smoothly, to another place; the target is elsewhere in each."""
+    """A dot that glides to a target (`to_target`) or, as smoothly, to another place; videos differ in both."""
 
     def __init__(self, name: str, to_target: bool, count: int = 48, seed: int = 3) -> None:
         rng = np.random.default_rng(seed)
@@ -46,7 +46,9 @@ class Reaches:
         return self.videos[rng.choice(len(self.videos), count, replace=count > len(self.videos))]
 
 
-def _paint(frame: NDArray[np.uint8], corner: NDArray[np.int64], color: tuple[int, int, int], side: int) -> None:
+def _paint(
+    frame: NDArray[np.uint8], corner: NDArray[np.int64], color: tuple[int, int, int], side: int
+) -> None:
     frame[corner[0] : corner[0] + side, corner[1] : corner[1] + side] = color
 
 

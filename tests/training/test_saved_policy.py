@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tiny_runs import ENCODING_BASED, ENDS_SOON, PICTURES, TINY, new_run
+from tiny_runs import ENCODING_BASED, ENDS_SOON, PICTURES, SEEING, TINY, new_run
 
 import bootifol
 from bootifol.envs.rollout import PlayedEpisode, play_episode
@@ -74,6 +74,13 @@ def test_its_actions_are_those_of_the_runs_evaluation_bit_for_bit(
     restored = bootifol.load_policy(tmp_path / "without")
     assert_same_actions(restored, episodes)
     assert restored.config == alone.config
+
+
+def test_a_policy_that_reads_states_carries_its_eyes(tmp_path: Path, demos: Path, played: Callable) -> None:
+    short = replace(SEEING, interactive=replace(SEEING.interactive, agent_steps=120))
+    assert new_run(tmp_path / "run", demos, config=short).learn()
+    copied = shutil.copy(tmp_path / "run" / "policy.safetensors", tmp_path / "alone.safetensors")
+    assert_same_actions(bootifol.load_policy(copied), played(tmp_path / "run"))
 
 
 def test_it_is_a_small_part_of_the_checkpoint(finished: Path) -> None:

@@ -29,6 +29,7 @@ from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
 from bootifol.gradient_step import take_step
 from bootifol.module_state import load_module_state, module_state
+from bootifol.networks.eyes import Eyes
 from bootifol.types import Action, Arrays, Batch, Observation, StepMetrics
 
 AnyEncoder = Encoder | EncodingEncoder | StateEncoder
@@ -155,6 +156,11 @@ class DrQv2:
                 f"{self.config.encoder!r} encoder; make them larger or choose another encoder"
             )
         return encoder
+
+    @property
+    def eyes(self) -> Eyes | None:
+        """What makes the states that the agent reads; None where it reads something else."""
+        return self._encodings.eyes if isinstance(self._encodings, StackedStates) else None
 
     @property
     def acting(self) -> tuple[AnyEncoder, Actor]:

@@ -12,7 +12,8 @@ import torch
 from torch import Tensor
 
 from bootifol.envs.pictures import resize
-from bootifol.rewards.base import EncodesFrames, SeesFrames
+from bootifol.networks.eyes import Eyes
+from bootifol.rewards.base import EncodesFrames
 from bootifol.types import Frames, FrameStates
 
 _CHANNELS = 3
@@ -55,19 +56,19 @@ class StackedStates:
     resumed run must see what the uninterrupted one did.
 
     Args:
-        model: sees single frames, and learns no more how.
+        eyes: make states of frames, and rest.
         stack: frames in an observation.
     """
 
-    def __init__(self, model: SeesFrames, stack: int) -> None:
-        self._model = model
+    def __init__(self, eyes: Eyes, stack: int) -> None:
+        self.eyes = eyes
         self._stack = stack
         self._seen: dict[bytes, FrameStates] = {}
 
     @property
     def size(self) -> int:
         """Numbers in a stack of states, `stack * Z`."""
-        return self._stack * self._model.feature_size
+        return self._stack * self.eyes.feature_size
 
     def __call__(self, observation: Tensor) -> Tensor:
         """States int8 `[1, stack * Z]`, oldest first, of one stack of pictures uint8 `[1, 3 * stack, S, S]`."""
@@ -79,7 +80,7 @@ class StackedStates:
             key = frame.tobytes()
             if key not in seen:
                 known = self._seen.get(key)
-                seen[key] = self._model.states(frame[None])[0] if known is None else known
+                seen[key] = self.eyes.states(frame[None])[0] if known is None else known
             stacked.append(seen[key])
         self._seen = seen
         return torch.from_numpy(np.concatenate(stacked))[None]

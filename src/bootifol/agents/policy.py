@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
+from torch import Tensor
 
 from bootifol.agents.drqv2 import DrQv2
+from bootifol.agents.encodings import StackedStates
 from bootifol.agents.networks import Actor, Encoder, as_batch
 from bootifol.devices import to_host
 from bootifol.envs.pictures import FrameStack, PictureConfig, centered_square, is_picture, resize, told_kind
 from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
 from bootifol.files import read_arrays, read_texts, write_arrays
+from bootifol.networks.eyes import Eyes, as_features
 from bootifol.own_modules import told
 from bootifol.types import Action, Arrays, Frame, Observation
 
@@ -92,18 +97,22 @@ class Policy:
 
 
 def write_policy(path: Path, config: PolicyConfig, agent: DrQv2) -> None:
-    """Writes what an agent that sees pictures acts with, and what rebuilds it, as one safetensors file."""
+    """Writes what an agent that sees pictures, or states of them, acts with, and what rebuilds it, as one safetensors
+    file."""
     encoder, actor = agent.acting
+    see = encoder if agent.eyes is None else agent.eyes
     arrays: Arrays = {
         f"{part}.{name}": to_host(parameter)
-        for part, network in (("encoder", encoder), ("actor", actor))
+        for part, network in (("encoder", see), ("actor", actor))
         for name, parameter in network.named_parameters()
     }
-    networks = {
+    networks: dict[str, Any] = {
         "encoder": agent.config.encoder,
         "feature_dim": agent.config.feature_dim,
         "hidden_dim": agent.config.hidden_dim,
     }
+    if agent.eyes is not None:
+        networks["eyes"] = [agent.eyes.channels, agent.eyes.width]
     about = {"format": FORMAT, "policy": dataclasses.asdict(config), "networks": networks}
     write_arrays(path, arrays, {"bootifol": json.dumps(about)})
 
@@ -129,10 +138,19 @@ def read_policy(path: Path) -> Policy:
         ) from error
 
 
-def _rebuilt(config: PolicyConfig, arrays: Arrays, encoder: str, feature_dim: int, hidden_dim: int) -> Act:
+def _rebuilt(
+    config: PolicyConfig,
+    arrays: Arrays,
+    encoder: str,
+    feature_dim: int,
+    hidden_dim: int,
+    eyes: Sequence[int] | None = None,
+) -> Act:
+    stack, size = config.pictures.stack, config.pictures.agent_size
     with torch.device("meta"):  # torch's own initialization would draw from the global generator
-        see = Encoder(encoder, 3 * config.pictures.stack, config.pictures.agent_size)  # type: ignore[arg-type]
-        decide = Actor(see.feature_count, config.action_dim, feature_dim, hidden_dim)
+        see = Encoder(encoder, 3 * stack, size) if eyes is None else Eyes(size, *eyes)  # type: ignore[arg-type]
+        inputs = see.feature_count if isinstance(see, Encoder) else stack * see.feature_size
+        decide = Actor(inputs, config.action_dim, feature_dim, hidden_dim)
     for prefix, network in (("encoder.", see), ("actor.", decide)):
         tensors = {
             name.removeprefix(prefix): torch.from_numpy(array.copy())
@@ -141,10 +159,15 @@ def _rebuilt(config: PolicyConfig, arrays: Arrays, encoder: str, feature_dim: in
         }
         network.load_state_dict(tensors, assign=True)
     see.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    if isinstance(see, Eyes):
+        states = StackedStates(see, stack)
+        encode: Callable[[Tensor], Tensor] = lambda pictures: as_features(states(pictures))  # noqa: E731
+    else:
+        encode = lambda pictures: see(pictures.float())  # noqa: E731
 
     def act(observation: Observation) -> Action:
         with torch.inference_mode():
-            action: Action = to_host(decide(see(as_batch(observation).float()))[0])
+            action: Action = to_host(decide(encode(as_batch(observation)))[0])
             return action
 
     return act

@@ -40,6 +40,7 @@ class Eyes(nn.Module):
 
     def __init__(self, video_size: int, channels: int, width: int) -> None:
         super().__init__()
+        self.channels, self.width = channels, width
         # The last layer halves the map.
         stride = max(video_size // (2 * _CELLS), 1)
         self.convolutions = nn.Sequential(

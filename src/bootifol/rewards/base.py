@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 
 from torch import Tensor
 
+from bootifol.networks.eyes import Eyes
 from bootifol.types import Arrays, Frames, FrameStates, Metrics, Rewards, Video, VideoSource
 
 
@@ -86,8 +87,9 @@ class SeesFrames(Protocol):
         """Z, numbers in a state."""
         ...
 
-    def states(self, frames: Frames) -> FrameStates:
-        """States int8 `[N, Z]` of frames uint8 `[N, S, S, 3]`."""
+    @property
+    def eyes(self) -> Eyes:
+        """What makes states of frames; they learn before the agent acts, and never after."""
         ...
 
     def with_features(self, video: Video) -> Video:

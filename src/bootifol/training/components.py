@@ -146,7 +146,7 @@ def _states(run: RunConfig, reward_model: RewardModel | None) -> StackedStates:
             f"agent.observations states needs pictures of one size for agent and reward, not {pictures.agent_size} "
             f"and {pictures.video_size}: pass --pictures.agent-size {pictures.video_size}"
         )
-    return StackedStates(reward_model, pictures.stack)
+    return StackedStates(reward_model.eyes, pictures.stack)
 
 
 def _state_size(run: RunConfig, reward_model: RewardModel) -> int:

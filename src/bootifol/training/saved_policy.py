@@ -52,7 +52,7 @@ def load_policy(run: AnyPath) -> Policy:
 def save_policy(
     directory: Path, run: RunConfig, environment: PixelEnvironment, agent: DrQv2, agent_steps: int
 ) -> None:
-    """Writes a run's policy, unless it acts on encodings, for which it needs the whole reward model.
+    """Writes a run's policy, unless it acts on encodings of a reward model that goes on learning.
 
     Args:
         directory: of the run.
@@ -61,7 +61,7 @@ def save_policy(
         agent: that it trains.
         agent_steps: of training so far.
     """
-    if reads_pictures(run):
+    if run.training.agent.observations != "encodings":
         write_policy(directory / NAME, _policy_config(run, environment, agent_steps), agent)
 
 

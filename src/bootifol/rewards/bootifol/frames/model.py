@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bootifol.devices import to_host
 from bootifol.errors import BootifolError
-from bootifol.networks.eyes import STATE_SIZE, as_features, rounding
+from bootifol.networks.eyes import STATE_SIZE, Eyes, as_features, rounding
 from bootifol.progress import progress
 from bootifol.rewards.bootifol.frames import losses
 from bootifol.rewards.bootifol.frames.config import FrameConfig
@@ -56,6 +56,11 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         self._other: VideoSource | None = None
         self._random: FrameStates | None = None
         self._expert: FrameStates | None = None
+
+    @property
+    def eyes(self) -> Eyes:
+        """What makes states of frames; they rest once the agent acts."""
+        return self.networks.eyes
 
     def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
         """Alignment Phase: eyes and head learn from the expert's and random videos.
@@ -120,7 +125,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
 
     def states(self, frames: Frames) -> FrameStates:
         """What the eyes make of frames uint8 `[N, S, S, 3]`: int8 `[N, Z]`."""
-        return self.networks.eyes.states(self._checked(frames))
+        return self.eyes.states(self._checked(frames))
 
     def with_features(self, video: Video) -> Video:
         """The video with the states of its frames."""
