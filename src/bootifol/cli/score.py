@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from bootifol.cli.arguments import RunPath, VideoPaths
+from bootifol.cli.arguments import RunPath, Trust, VideoPaths
 
 
 def score(
@@ -15,6 +15,7 @@ def score(
     videos: VideoPaths,
     out: Path | None = None,
     picture: Path | None = None,
+    trust: Trust = 0,
 ) -> int:
     """Reward videos with a run's learned reward: one number each, every step's in a CSV file or above film strips.
 
@@ -23,6 +24,7 @@ def score(
         videos: Video files (mp4, webm, gif …), folders of frames, .npy files, LeRobot datasets, or demo sets.
         out: CSV file to write the reward of every step to: columns video, step, reward.
         picture: PNG file to draw the reward of every step to, above the film strips of the first six videos.
+        trust: Import the code that the run names as its task or method (MODULE:NAME); other runs need none.
     """
     from bootifol.reports.film_strip import rewards_above_film_strips
     from bootifol.reports.style import RUN_COLORS, require_png, save_png
@@ -33,7 +35,7 @@ def score(
         require_png(picture)
     rewards: dict[str, Rewards] = {}
     shown: list[tuple[Video, Rewards]] = []
-    for video, of_video in scored_videos(run, videos):
+    for video, of_video in scored_videos(run, videos, bool(trust)):
         rewards[video.name] = of_video
         if picture is not None and len(shown) < len(RUN_COLORS):
             shown.append((video, of_video))

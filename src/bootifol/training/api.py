@@ -106,13 +106,17 @@ def train_policy(
     return TrainedRun(directory, finished=_learn_and_report(learner))
 
 
-def continue_run(directory: AnyPath) -> bool:
+def continue_run(directory: AnyPath, trust: bool = False) -> bool:
     """Goes on with a run from its newest checkpoint, to its end, its final evaluation and its report.
+
+    Args:
+        directory: of the run.
+        trust: whether code that its `config.json` names (a task or a method `MODULE:NAME`) may be imported.
 
     Returns:
         False if it was asked to stop before its end.
     """
-    run = _run_with_demos(directory)
+    run = _run_with_demos(directory, trust)
     return _learn_and_report(Run(run, Path(directory), Console(stderr=True)))
 
 
@@ -137,7 +141,11 @@ class RunEvaluation:
 
 
 def evaluate_run(
-    directory: AnyPath, episodes: int = 10, seed: int = 1000, videos: AnyPath | None = None
+    directory: AnyPath,
+    episodes: int = 10,
+    seed: int = 1000,
+    videos: AnyPath | None = None,
+    trust: bool = False,
 ) -> RunEvaluation:
     """Plays a run's newest policy, without exploration, in episodes of the task's evaluation length.
 
@@ -146,12 +154,13 @@ def evaluate_run(
         episodes: how many, at least one.
         seed: of the starts.
         videos: directory to write each episode to as `episode-<number from 0>.mp4`; None writes none.
+        trust: whether code that its `config.json` names (a task or a method `MODULE:NAME`) may be imported.
 
     Raises:
         BootifolError: there is no run, it has no checkpoint yet, or a file cannot be read or written.
     """
     require_at_least(0, seed=seed)
-    run = RunConfig.read(Path(directory))
+    run = RunConfig.read(Path(directory), trust, needs_method=False)
     task = run.resolved_task()
     environment = build_environment(run, task.evaluation_steps)
     agent, saved = restored_agent(run, Path(directory), environment)
@@ -182,21 +191,26 @@ def evaluate_run(
     return RunEvaluation(results, summary, scaled_return(summary.mean, **levels), task.evaluation_steps, rows)
 
 
-def score_videos(directory: AnyPath, videos: Sequence[AnyPath]) -> dict[str, Rewards]:
+def score_videos(
+    directory: AnyPath, videos: Sequence[AnyPath], trust: bool = False
+) -> dict[str, Rewards]:
     """The learned reward along videos, each compared with the same expert videos where the method compares.
 
     Args:
         directory: of the run.
         videos: video files, folders of frames, .npy files, LeRobot datasets or demo sets. Files are cut to a square and
             resampled to the expert videos' pictures per second, as an import does.
+        trust: whether code that its `config.json` names (a task or a method `MODULE:NAME`) may be imported.
 
     Returns:
         Rewards `[T]` by the video's name. A video longer than those it is compared with is scored as far as they reach.
     """
-    return {video.name: rewards for video, rewards in scored_videos(directory, videos)}
+    return {video.name: rewards for video, rewards in scored_videos(directory, videos, trust)}
 
 
-def scored_videos(directory: AnyPath, videos: Sequence[AnyPath]) -> Iterator[tuple[Video, Rewards]]:
+def scored_videos(
+    directory: AnyPath, videos: Sequence[AnyPath], trust: bool = False
+) -> Iterator[tuple[Video, Rewards]]:
     """The same one by one, with the pictures that were scored.
 
     Raises:
@@ -204,7 +218,7 @@ def scored_videos(directory: AnyPath, videos: Sequence[AnyPath]) -> Iterator[tup
     """
     if not videos:
         raise BootifolError("there are no videos to score: name files, folders of pictures, or demo sets")
-    run = _run_with_demos(directory)
+    run = _run_with_demos(directory, trust)
     model = build_reward_model(run)
     if model.reads_environment_reward:
         raise BootifolError(
@@ -229,9 +243,9 @@ def write_scores(path: Path, scores: dict[str, Rewards]) -> None:
             writer.writerows([name, step, f"{reward:.6g}"] for step, reward in enumerate(rewards))
 
 
-def _run_with_demos(directory: AnyPath) -> RunConfig:
+def _run_with_demos(directory: AnyPath, trust: bool) -> RunConfig:
     """A run's configuration, once its method and its videos are seen to be where it looks for them."""
-    run = RunConfig.read(Path(directory))
+    run = RunConfig.read(Path(directory), trust)
     check_method(run.method)
     if not Path(run.demos).is_dir():
         raise BootifolError(

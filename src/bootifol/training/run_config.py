@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from bootifol.errors import BootifolError, require_at_least
 from bootifol.files import read_json, write_json
+from bootifol.own_modules import require_trust
 from bootifol.tasks import Task, task_named
 from bootifol.training.config import TrainingConfig
 from bootifol.training.provenance import versions, videos_in
@@ -71,11 +72,17 @@ class RunConfig:
             write_json(path, data)
 
     @classmethod
-    def read(cls, directory: Path) -> RunConfig:
+    def read(cls, directory: Path, trust: bool = False, needs_method: bool = True) -> RunConfig:
         """Reads `config.json`.
 
+        Args:
+            directory: of the run.
+            trust: whether code that it names (a task or a method `MODULE:NAME`) may be imported.
+            needs_method: False for who acts and rewards nothing: the method is not imported then, unless the agent acts
+                on its encodings.
+
         Raises:
-            BootifolError: it is missing, damaged, or of another format.
+            BootifolError: it is missing, damaged, of another format, or names code that is not trusted.
         """
         path = directory / "config.json"
         if not path.is_file():
@@ -87,7 +94,7 @@ class RunConfig:
             )
         hints = typing.get_type_hints(cls)
         try:
-            return cls(
+            run = cls(
                 **{
                     name: _checked(data[name], hints[name], name, path)
                     for name in hints
@@ -97,6 +104,10 @@ class RunConfig:
             )
         except KeyError as error:
             raise BootifolError(f"{path} lacks {error}; restore the file or start a new run") from error
+        require_trust(path, "task", run.task, trust)
+        if needs_method or run.training.agent.observations == "encodings":
+            require_trust(path, "method", run.method, trust)
+        return run
 
 
 def from_json(kind: type[_Config], data: Any, path: Path) -> _Config:
