@@ -25,6 +25,8 @@ from bootifol.types import Arrays, Frames
 ALIGNMENT = "alignment"
 CLONING = "cloning"
 INTERACTIVE = "interactive"
+LARGEST_VIDEO = 50_000_000
+"""Bytes of an mp4 file above which a report does not hold it: a run's own have less than a hundredth."""
 COUNTERS = {ALIGNMENT: "gradient_step", CLONING: "gradient_step", INTERACTIVE: "agent_steps"}
 """The phases, and what each counts."""
 
@@ -371,6 +373,9 @@ def _read_table(path: Path, read: Callable[[Path], Table[Row]], what: str, notes
 
 
 def _read_showcase(path: Path, notes: list[str]) -> dict[tuple[str, int], ShowcaseVideo]:
+    if path.exists() and _leaves(path.parent, path):
+        notes.append("showcase.safetensors was left out: it is a link that leaves the run.")
+        return {}
     if not path.exists():
         notes.append("showcase.safetensors is missing: no film strips and no reward along videos.")
         return {}
@@ -419,13 +424,26 @@ def _find_videos(directory: Path, notes: list[str]) -> dict[tuple[str, int], Pat
         match = re.fullmatch(r"(\w+)-(\d+)\.mp4", path.name)
         if match is None:
             continue
-        if path.stat().st_size == 0:
+        if _leaves(directory.parent, path):
+            notes.append(f"videos/{path.name} was left out: it is a link that leaves the run.")
+        elif not path.is_file() or path.stat().st_size > LARGEST_VIDEO:
+            notes.append(f"videos/{path.name} was left out: it is no video of a run's.")
+        elif path.stat().st_size == 0:
             notes.append(f"videos/{path.name} is empty.")
         else:
             found[match.group(1), int(match.group(2))] = path
     if not found:
         notes.append("there are no videos to play.")
     return found
+
+
+def _leaves(run_dir: Path, path: Path) -> bool:
+    """Whether a path is a link that leads out of the run, or nowhere; a report must not show a stranger's choice of this
+    machine's files."""
+    try:
+        return not path.resolve(strict=True).is_relative_to(run_dir.resolve())
+    except (OSError, RuntimeError):  # the latter where links form a circle
+        return True
 
 
 def _count(number: int, noun: str) -> str:
