@@ -17,6 +17,7 @@ LAYERS = ["envs", "experts", "demos", "networks", "rewards", "replay", "agents",
 SHARED = {
     "types",
     "errors",
+    "checksums",
     "files",
     "devices",
     "gradient_step",

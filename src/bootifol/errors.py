@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+import reprlib
 import typing
 
 STOPPED = 130
 """Exit code of a command that was asked to stop before its end, as shells give it after Ctrl-C."""
+
+
+_brief = reprlib.Repr()
+_brief.maxlevel, _brief.maxstring, _brief.maxother = 3, 200, 200
 
 
 class BootifolError(Exception):
@@ -14,6 +19,12 @@ class BootifolError(Exception):
 
     The command line prints it without a traceback and exits with code 2.
     """
+
+
+def shortened(value: object) -> str:
+    """A value out of somebody's file as a sentence can hold it."""
+    text = _brief.repr(value)
+    return text if len(text) <= 300 else f"{text[:300]}…"
 
 
 def fields_of(what: str, config: object, *names: str) -> dict[str, float]:

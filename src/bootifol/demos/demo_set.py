@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bootifol.checksums import require_as_written
 from bootifol.demos.manifest import MANIFEST_NAME, Manifest, read_manifest
 from bootifol.demos.shards import open_shard, sha256_of_file, sha256_of_frames
 from bootifol.errors import BootifolError
@@ -96,11 +97,12 @@ class DemoSet:
         )
 
     def verify(self) -> None:
-        """Reads every byte and compares every checksum, of files and of videos.
+        """Reads every byte and compares every checksum: the manifest's, and those of all files.
 
         Raises:
             BootifolError: naming the file, and the videos in it that differ.
         """
+        require_as_written(self.path / MANIFEST_NAME, "the demo set's manifest")
         with progress(f"verifying {self.manifest.name}", total=len(self)) as advance:
             first = 0
             for shard in self.manifest.shards:
