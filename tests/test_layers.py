@@ -18,6 +18,8 @@ SHARED = {
     "types",
     "errors",
     "checksums",
+    "locks",
+    "output",
     "files",
     "devices",
     "gradient_step",

@@ -14,6 +14,10 @@ _brief = reprlib.Repr()
 _brief.maxlevel, _brief.maxstring, _brief.maxother = 3, 200, 200
 
 
+LARGEST_SEED = 2**63 - 1
+"""What every generator of random numbers that is seeded takes."""
+
+
 class BootifolError(Exception):
     """What was wrong, where, and what to do, in one sentence.
 
@@ -21,10 +25,25 @@ class BootifolError(Exception):
     """
 
 
+class EnvironmentFailed(BootifolError):
+    """An environment raised an error of its own, and whoever acts in it is none the worse: what was learned is whole."""
+
+
 def shortened(value: object) -> str:
     """A value out of somebody's file as a sentence can hold it."""
     text = _brief.repr(value)
     return text if len(text) <= 300 else f"{text[:300]}…"
+
+
+def printable(text: str) -> str:
+    """A sentence without what would steer a terminal, which a stranger's name in it may hold."""
+    return "".join(sign if sign.isprintable() or sign in "\n\t" else f"\\x{ord(sign):02x}" for sign in text)
+
+
+def is_lack_of_memory(error: BaseException) -> bool:
+    """Whether an error says that an array or a tensor does not fit in memory; PyTorch's has no class of its own."""
+    words = ("allocate memory", "out of memory", "Storage size calculation overflowed", "numel")
+    return isinstance(error, MemoryError) or any(word in str(error) for word in words)
 
 
 def fields_of(what: str, config: object, *names: str) -> dict[str, float]:
@@ -42,6 +61,17 @@ def require_at_least(minimum: float, **fields: float) -> None:
     for name, value in fields.items():
         if not minimum <= value < math.inf:
             raise BootifolError(f"{name} must be at least {minimum}, not {value}")
+
+
+def require_at_most(maximum: float, **fields: float) -> None:
+    """Refuses numbers above a maximum; NaN, too.
+
+    Raises:
+        BootifolError: names the first such field.
+    """
+    for name, value in fields.items():
+        if not value <= maximum:
+            raise BootifolError(f"{name} must be at most {maximum:,}, not {shortened(value)}")
 
 
 def require_positive(**fields: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -102,27 +102,36 @@ class DemoSet:
         Raises:
             BootifolError: naming the file, and the videos in it that differ.
         """
-        require_as_written(self.path / MANIFEST_NAME, "the demo set's manifest")
         with progress(f"verifying {self.manifest.name}", total=len(self)) as advance:
-            first = 0
-            for shard in self.manifest.shards:
-                damaged = [
-                    self.manifest.videos[index].name
-                    for index in range(first, first + shard.videos)
-                    if sha256_of_frames(self[index].frames) != self.manifest.videos[index].sha256
-                ]
-                if damaged:
-                    raise BootifolError(
-                        f"{self.path / shard.file} is damaged: the pixels of {listed(damaged)} are not "
-                        "the ones recorded; restore the file or record the set again"
-                    )
-                if sha256_of_file(self.path / shard.file) != shard.sha256:
-                    raise BootifolError(
-                        f"{self.path / shard.file} is damaged: its checksum is not the manifest's, though "
-                        "its videos are whole; restore the file or record the set again"
-                    )
-                first += shard.videos
-                advance(shard.videos)
+            for videos in self.verified_shards():
+                advance(videos)
+
+    def verified_shards(self) -> Iterator[int]:
+        """The same shard by shard, and without a word.
+
+        Yields:
+            How many videos were found to be whole, each time.
+        """
+        require_as_written(self.path / MANIFEST_NAME, "the demo set's manifest")
+        first = 0
+        for shard in self.manifest.shards:
+            damaged = [
+                self.manifest.videos[index].name
+                for index in range(first, first + shard.videos)
+                if sha256_of_frames(self[index].frames) != self.manifest.videos[index].sha256
+            ]
+            if damaged:
+                raise BootifolError(
+                    f"{self.path / shard.file} is damaged: the pixels of {listed(damaged)} are not "
+                    "the ones recorded; restore the file or record the set again"
+                )
+            if sha256_of_file(self.path / shard.file) != shard.sha256:
+                raise BootifolError(
+                    f"{self.path / shard.file} is damaged: its checksum is not the manifest's, though "
+                    "its videos are whole; restore the file or record the set again"
+                )
+            first += shard.videos
+            yield shard.videos
 
 
 class VideoSubset:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 import tokenize
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,17 +79,29 @@ class OpenShard:
     videos: int
     offset: int
     """Bytes before the first video."""
+    sha256: str
+    """What the manifest says of the whole file."""
+    stamps: set[tuple[int, ...]]
+    """Of the file when it was opened, and when it was seen to hold the same bytes still."""
 
     def read(self, row: int, frames: Frames) -> None:
         """Fills `frames`, uint8 `[T + 1, H, W, 3]` in one piece of memory, with video `row`.
 
         Raises:
-            BootifolError: the file is gone, or shorter than it was.
+            BootifolError: the file is gone, is shorter than it was, or was replaced by another.
         """
         try:
             with self.path.open("rb") as file:
                 file.seek(self.offset + row * frames.nbytes)
                 complete = file.readinto(frames.data) == frames.nbytes
+                stamp = _stamp(os.fstat(file.fileno()))
+                if complete and stamp not in self.stamps:
+                    if sha256_of_file(self.path) != self.sha256:
+                        raise BootifolError(
+                            f"{self.path} was replaced or changed while it was in use: put back the videos that were "
+                            "learned from"
+                        )
+                    self.stamps.add(stamp)
         except OSError as error:
             raise BootifolError(
                 f"{self.path} cannot be read any more: {error}; restore it and run the command again"
@@ -107,7 +120,8 @@ def open_shard(directory: Path, shard: Shard, manifest: Manifest) -> OpenShard:
     """
     path = directory / shard.file
     try:
-        size = path.stat().st_size
+        status = path.stat()
+        size = status.st_size
     except OSError:
         raise BootifolError(
             f"{path} is missing, and with it {shard.videos} videos: restore it or record the set again"
@@ -135,7 +149,12 @@ def open_shard(directory: Path, shard: Shard, manifest: Manifest) -> OpenShard:
             f"{path} is damaged: {size - offset:,} bytes follow its header, which promises "
             f"{math.prod(expected):,}; restore it or record the set again"
         )
-    return OpenShard(path, shard.videos, offset)
+    return OpenShard(path, shard.videos, offset, shard.sha256, {_stamp(status)})
+
+
+def _stamp(status: os.stat_result) -> tuple[int, ...]:
+    """What changes when a file is replaced or written to."""
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
 
 
 def _header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[np.generic]]:

@@ -20,6 +20,7 @@ from bootifol.evaluation.returns import evaluate as evaluate_act
 from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import EvaluationRow
 from bootifol.files import written_aside
+from bootifol.output import output_may_fail
 from bootifol.presets import preset as preset_named
 from bootifol.progress import progress
 from bootifol.reports.html import report
@@ -34,7 +35,14 @@ from bootifol.training.components import (
     reference_rng,
 )
 from bootifol.training.config import TrainingConfig
+from bootifol.training.interruption import Stopped
 from bootifol.training.run_config import RunConfig
+from bootifol.training.run_directory import (
+    require_resumable,
+    require_same_videos,
+    require_unused,
+    writing_run,
+)
 from bootifol.training.saved_policy import require_checkpoint, restored_agent
 from bootifol.training.train import Run
 from bootifol.types import AnyPath, Rewards, Video
@@ -86,12 +94,7 @@ def train_policy(
     Raises:
         BootifolError: bad input, or an error that the run can be resumed from, which its sentence says.
     """
-    directory, console = Path(out), Console(stderr=True)
-    if (directory / "config.json").exists():
-        raise BootifolError(
-            f"{directory} holds a run already: go on with `bootifol train --resume {directory}`, or choose "
-            "another --out"
-        )
+    directory = Path(out)
     run = RunConfig(
         task=task,
         method=method,
@@ -101,9 +104,11 @@ def train_policy(
         time_budget=time_budget,
         training=config or preset_named(preset),
     )
-    learner = Run(run, directory, console)
-    run.write(directory, list(command))
-    return TrainedRun(directory, finished=_learn_and_report(learner))
+    with output_may_fail(), writing_run(directory):
+        require_unused(directory)
+        learner = Run(run, directory, _console())
+        run.write(directory, list(command))
+        return TrainedRun(directory, finished=_learn_and_report(learner))
 
 
 def continue_run(directory: AnyPath, trust: bool = False) -> bool:
@@ -115,9 +120,16 @@ def continue_run(directory: AnyPath, trust: bool = False) -> bool:
 
     Returns:
         False if it was asked to stop before its end.
+
+    Raises:
+        BootifolError: there is no run or no checkpoint, the videos are others than it began with, another process
+            writes to the run, or an error that the run can be resumed from.
     """
+    directory = Path(directory)
     run = _run_with_demos(directory, trust)
-    return _learn_and_report(Run(run, Path(directory), Console(stderr=True)))
+    with output_may_fail(), writing_run(directory):
+        require_resumable(directory)
+        return _learn_and_report(Run(run, directory, _console()))
 
 
 @dataclass(frozen=True)
@@ -225,7 +237,7 @@ def scored_videos(
             f"{directory} was trained on the environment's reward: it has no reward for videos"
         )
     load_checkpoint(require_checkpoint(Path(directory)), {"reward_model": model})
-    expert = open_demos(run, build_backbone(run), Console(stderr=True)).expert
+    expert = open_demos(run, build_backbone(run), _console()).expert
     references = draw_references(model, expert, reference_rng(run.seed, 0))
     length = min((len(reference.frames) for reference in references), default=None)
     for path in map(Path, videos):
@@ -252,16 +264,26 @@ def _run_with_demos(directory: AnyPath, trust: bool) -> RunConfig:
             f"the videos that {directory} learns from are not at {run.demos}: give the command in the directory in "
             "which the run was started, or put them back"
         )
+    require_same_videos(Path(directory), run)
     return run
 
 
 def _learn_and_report(run: Run) -> bool:
     if not run.learn():
         return False
-    run.finish()
+    try:
+        run.finish()
+    except Stopped:
+        run.console.print(f"stopped before its last measurements. {run.how_to_resume()}")
+        return False
     target = report([run.directory], run.directory / "report.html")
     run.console.print(f"report: {target}")
     return True
+
+
+def _console() -> Console:
+    """Where messages go; what they hold, such as a path, is no markup."""
+    return Console(stderr=True, markup=False, emoji=False, soft_wrap=True)
 
 
 def read_videos(path: Path, run: RunConfig) -> Iterator[Video]:

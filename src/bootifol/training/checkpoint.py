@@ -44,8 +44,6 @@ FORMAT = 2
 _NAME = re.compile(r"\d{12}-\d{9}")
 """Of a checkpoint's directory; whatever else lies beside it is somebody's own."""
 _PUT_ASIDE = re.compile(r"\.(\d{12}-\d{9})\.[0-9a-f]{8}\.old")
-_WRITTEN_SINCE = {"episode"}
-"""Files that a checkpoint of an earlier version lacks."""
 
 
 class Stateful(Protocol):
@@ -128,8 +126,6 @@ def load_checkpoint(checkpoint: Path, components: Mapping[str, Stateful]) -> Pro
             "resume with the version named in the run's config.json"
         ) from error
     for name, component in components.items():
-        if name in _WRITTEN_SINCE and not (checkpoint / f"{name}.safetensors").exists():
-            continue
         arrays = read_arrays(checkpoint / f"{name}.safetensors", f"the checkpoint's {name}")
         try:
             component.load_state(arrays)
