@@ -57,8 +57,8 @@ def require_as_written(path: Path, what: str) -> None:
     """
     if not is_as_written(path):
         raise BootifolError(
-            f"{what} is damaged or incomplete: {path}: its bytes are not those that its checksum is of; restore it from a "
-            'copy (who changed it on purpose takes its "checksum" out)'
+            f"{what} is damaged or incomplete: {path}: its bytes are not those its checksum is of; restore it from "
+            'a copy (who changed it on purpose takes its "checksum" out)'
         )
 
 

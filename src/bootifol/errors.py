@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import reprlib
 import typing
@@ -17,6 +18,14 @@ _brief.maxlevel, _brief.maxstring, _brief.maxother = 3, 200, 200
 LARGEST_SEED = 2**63 - 1
 """What every generator of random numbers that is seeded takes."""
 
+LARGEST_COUNT = 10**9
+"""No setting that counts something is larger."""
+
+MOST_THREADS = 1024
+
+LONGEST_EPISODE = 100_000
+"""Agent steps; its pictures alone would take gigabytes."""
+
 
 class BootifolError(Exception):
     """What was wrong, where, and what to do, in one sentence.
@@ -25,8 +34,8 @@ class BootifolError(Exception):
     """
 
 
-class EnvironmentFailed(BootifolError):
-    """An environment raised an error of its own, and whoever acts in it is none the worse: what was learned is whole."""
+class EnvironmentFailed(BootifolError):  # noqa: N818
+    """An environment raised an error of its own. Who acts in it is none the worse: what was learned is whole."""
 
 
 def shortened(value: object) -> str:
@@ -60,7 +69,7 @@ def require_at_least(minimum: float, **fields: float) -> None:
     """
     for name, value in fields.items():
         if not minimum <= value < math.inf:
-            raise BootifolError(f"{name} must be at least {minimum}, not {value}")
+            raise BootifolError(f"{name} must be at least {minimum}, not {shortened(value)}")
 
 
 def require_at_most(maximum: float, **fields: float) -> None:
@@ -72,6 +81,25 @@ def require_at_most(maximum: float, **fields: float) -> None:
     for name, value in fields.items():
         if not value <= maximum:
             raise BootifolError(f"{name} must be at most {maximum:,}, not {shortened(value)}")
+
+
+def require_reasonable(of: str, config: object) -> None:
+    """Refuses whole numbers above `LARGEST_COUNT` and numbers that are not finite, in a configuration and in those
+    inside it.
+
+    Args:
+        of: the configuration's name, or nothing.
+        config: a dataclass.
+
+    Raises:
+        BootifolError: names the field, dotted as on the command line.
+    """
+    for field in dataclasses.fields(config):  # type: ignore[arg-type]
+        name, value = f"{of}.{field.name}".lstrip("."), getattr(config, field.name)
+        if dataclasses.is_dataclass(value):
+            require_reasonable(name, value)
+        elif isinstance(value, int | float) and not -LARGEST_COUNT <= value <= LARGEST_COUNT:
+            raise BootifolError(f"{name} is {shortened(value)}, beyond all that is possible: choose another")
 
 
 def require_positive(**fields: float) -> None:

@@ -62,7 +62,9 @@ class _Dropping:
     def _errors(self) -> Iterator[None]:
         try:
             yield
-        except RuntimeError:  # a signal came while this stream was being written to, and its handler writes, too
+        except (
+            RuntimeError
+        ):  # a signal came while this stream was being written to, and its handler writes, too
             pass
         except (OSError, ValueError):  # the latter where it is closed
             with suppress(OSError, ValueError):

@@ -15,7 +15,6 @@ from typing import Any
 
 from bootifol.errors import BootifolError
 
-
 _allowed: set[str] = set()
 """Names that were imported in this process already, so somebody typed or trusted them."""
 
@@ -45,8 +44,8 @@ def require_trust(path: Path, what: str, name: str, trust: bool) -> None:
     """
     if imports_code(name) and not trust and name not in _allowed:
         raise BootifolError(
-            f"{path} names the {what} {name!r}, which is code of its author's, and none of it was run: if you know that "
-            "code and trust it, add --trust (from Python trust=True)"
+            f"{path} names the {what} {name!r}, which is code of its author's, and none of it was run: if you know "
+            "that code and trust it, add --trust (from Python trust=True)"
         )
 
 

@@ -20,7 +20,6 @@ from bootifol.errors import BootifolError
 from bootifol.files import parsed_json
 from bootifol.types import Metrics, StepMetrics
 
-
 _PIECE = 1 << 16
 
 

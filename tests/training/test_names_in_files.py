@@ -23,7 +23,9 @@ def evil(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A module in the current directory, and the file that it writes when it is imported."""
     here, mark = tmp_path / "here", tmp_path / "it_ran"
     here.mkdir()
-    (here / "evil.py").write_text(f"open({str(mark)!r}, 'w').close()\ndef make(*_):\n    raise SystemExit(0)\n")
+    (here / "evil.py").write_text(
+        f"open({str(mark)!r}, 'w').close()\ndef make(*_):\n    raise SystemExit(0)\n"
+    )
     monkeypatch.chdir(here)
     monkeypatch.setattr(own_modules, "_allowed", set())
     yield mark

@@ -107,7 +107,9 @@ def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
         signal_at(patch, signal.SIGTERM, episode=4)
         assert not new_run(tmp_path / "parts", demos, method, config).learn()
     rest = resumed(tmp_path / "parts")
-    assert (rest.counters.episodes, rest.interactive.steps_in_progress) == (4, 1), "after a step, not an episode"
+    assert (rest.counters.episodes, rest.interactive.steps_in_progress) == (4, 1), (
+        "after a step, not an episode"
+    )
     assert rest.learn()
 
     assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
@@ -118,7 +120,10 @@ def metrics_of(run: Path) -> list[dict[str, object]]:
     """What was logged, without times and without what means of an interrupted line differ in."""
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     kept = ("phase", "gradient_step", "agent_steps")
-    return [{k: v for k, v in line.items() if k in kept or k.startswith(("evaluation", "ranking"))} for line in lines]
+    return [
+        {k: v for k, v in line.items() if k in kept or k.startswith(("evaluation", "ranking"))}
+        for line in lines
+    ]
 
 
 def test_stops_at_any_moment_leave_the_uninterrupted_run(
@@ -175,7 +180,9 @@ def test_an_environment_that_fails_loses_nothing(
         return step(action)
 
     monkeypatch.setattr(run.environment.simulator, "step", failing)
-    with pytest.raises(BootifolError, match=r"the arm fell off \(ZeroDivisionError in test_resume.py.*--resume"):
+    with pytest.raises(
+        BootifolError, match=r"the arm fell off \(ZeroDivisionError in test_resume.py.*--resume"
+    ):
         run.learn()
     rest = resumed(tmp_path / "parts")
     assert rest.counters.agent_steps == 99

@@ -57,8 +57,8 @@ def _exit_code(words: list[str]) -> int:
         if not is_lack_of_memory(error):
             raise
         return _refused(
-            f"this needs more memory than the machine has ({told(error)}): choose fewer or smaller pictures, networks or "
-            "batches"
+            f"this needs more memory than the machine has ({told(error)}): choose fewer or smaller pictures, networks "
+            "or batches"
         )
     except KeyboardInterrupt:
         Console(stderr=True).print("stopped")

@@ -26,7 +26,8 @@ from bootifol.demos.upright import TimedFrame
 from bootifol.demos.video_files import frame_rate, is_lerobot_dataset, stream_video
 from bootifol.envs.pictures import centered_square, resize
 from bootifol.errors import BootifolError
-from bootifol.files import written_aside
+from bootifol.files import remove_leftovers, written_aside
+from bootifol.locks import one_writer
 from bootifol.progress import progress
 from bootifol.types import Frame, Frames
 
@@ -105,10 +106,14 @@ def import_videos(
         raise BootifolError("there are no videos to import: name files, or folders of pictures")
     name = name or f"{out.resolve().parent.name}-{behavior}"
     sources = _sources(files, camera)
-    with written_aside(out) as aside:
-        aside.mkdir()
-        _write_set(aside, sources, conversion, behavior, name)
-        write_contact_sheet(aside, DemoSet.open(aside))
+    with one_writer(out, out.parent / f".{out.name}.lock"):
+        remove_leftovers(out.parent, out)
+        if out.exists():
+            raise BootifolError(f"{out} exists by now: another process has imported videos there")
+        with written_aside(out) as aside:
+            aside.mkdir()
+            _write_set(aside, sources, conversion, behavior, name)
+            write_contact_sheet(aside, DemoSet.open(aside))
     return DemoSet.open(out)
 
 

@@ -438,8 +438,8 @@ def _find_videos(directory: Path, notes: list[str]) -> dict[tuple[str, int], Pat
 
 
 def _leaves(run_dir: Path, path: Path) -> bool:
-    """Whether a path is a link that leads out of the run, or nowhere; a report must not show a stranger's choice of this
-    machine's files."""
+    """Whether a path is a link that leads out of the run, or nowhere: a stranger would choose which of this machine's
+    files a report shows."""
     try:
         return not path.resolve(strict=True).is_relative_to(run_dir.resolve())
     except (OSError, RuntimeError):  # the latter where links form a circle

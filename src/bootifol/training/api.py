@@ -14,7 +14,13 @@ from bootifol.demos.import_videos import LARGEST_SQUARE, read_recordings
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.demos.video_writing import write_video
 from bootifol.envs.rollout import PlayedEpisode
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.errors import (
+    LARGEST_COUNT,
+    LARGEST_SEED,
+    BootifolError,
+    require_at_least,
+    require_at_most,
+)
 from bootifol.evaluation.returns import EpisodeResult, evaluation_rows, evaluation_seeds, scaled_return
 from bootifol.evaluation.returns import evaluate as evaluate_act
 from bootifol.evaluation.summary import Summary, summarize
@@ -172,6 +178,8 @@ def evaluate_run(
         BootifolError: there is no run, it has no checkpoint yet, or a file cannot be read or written.
     """
     require_at_least(0, seed=seed)
+    require_at_most(LARGEST_SEED, seed=seed)
+    require_at_most(LARGEST_COUNT, episodes=episodes)
     run = RunConfig.read(Path(directory), trust, needs_method=False)
     task = run.resolved_task()
     environment = build_environment(run, task.evaluation_steps)
@@ -203,9 +211,7 @@ def evaluate_run(
     return RunEvaluation(results, summary, scaled_return(summary.mean, **levels), task.evaluation_steps, rows)
 
 
-def score_videos(
-    directory: AnyPath, videos: Sequence[AnyPath], trust: bool = False
-) -> dict[str, Rewards]:
+def score_videos(directory: AnyPath, videos: Sequence[AnyPath], trust: bool = False) -> dict[str, Rewards]:
     """The learned reward along videos, each compared with the same expert videos where the method compares.
 
     Args:

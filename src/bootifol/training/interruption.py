@@ -34,7 +34,10 @@ class Interruption:
     def __enter__(self) -> Interruption:
         if threading.current_thread() is threading.main_thread():
             for number in (getattr(signal, name) for name in _SIGNALS if hasattr(signal, name)):
-                if number not in (signal.SIGINT, signal.SIGTERM) and signal.getsignal(number) == signal.SIG_IGN:
+                if (
+                    number not in (signal.SIGINT, signal.SIGTERM)
+                    and signal.getsignal(number) == signal.SIG_IGN
+                ):
                     continue  # started with nohup, to outlive its terminal
                 self._previous[number] = signal.signal(number, self._handle)
         return self
@@ -54,4 +57,6 @@ class Interruption:
             raise KeyboardInterrupt
         self.requested = True
         with suppress(OSError, ValueError, RuntimeError):  # nobody may be there to read it
-            print("\nstopping after this step and writing a checkpoint; Ctrl-C again stops at once", flush=True)
+            print(
+                "\nstopping after this step and writing a checkpoint; Ctrl-C again stops at once", flush=True
+            )

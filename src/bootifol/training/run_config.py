@@ -12,7 +12,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bootifol.checksums import is_as_written
-from bootifol.errors import LARGEST_SEED, BootifolError, require_at_least, require_at_most, shortened
+from bootifol.errors import (
+    LARGEST_COUNT,
+    LARGEST_SEED,
+    BootifolError,
+    require_at_least,
+    require_at_most,
+    shortened,
+)
 from bootifol.files import read_json, write_json
 from bootifol.own_modules import require_trust
 from bootifol.tasks import Task, task_named
@@ -42,6 +49,7 @@ class RunConfig:
         require_at_most(LARGEST_SEED, seed=self.seed)
         if self.time_budget is not None:
             require_at_least(0, time_budget=self.time_budget)
+            require_at_most(LARGEST_COUNT, time_budget=self.time_budget)
 
     def resolved_task(self) -> Task:
         """The task with the lengths that this run gives its episodes."""
@@ -145,8 +153,8 @@ def from_json(kind: type[_Config], data: Any, path: Path) -> _Config:
     unknown = sorted(set(data) - set(hints))
     if unknown:
         raise BootifolError(
-            f"{path} names {shortened(', '.join(unknown))}, which this version of bootifol does not know: go on with the version "
-            "that made the run, or start a new one"
+            f"{path} names {', '.join(unknown)[:300]}, which this version of bootifol does not know: go on with the "
+            "version that made the run, or start a new one"
         )
     values: dict[str, Any] = {}
     for name, value in data.items():

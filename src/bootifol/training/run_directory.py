@@ -48,8 +48,8 @@ def require_unused(directory: Path) -> None:
     found = [name for name in WRITTEN if (directory / name).exists()]
     if found:
         raise BootifolError(
-            f"{directory} holds {', '.join(found)} of a run whose config.json is missing: choose another --out, or move "
-            "them away"
+            f"{directory} holds {', '.join(found)} of a run whose config.json is missing: choose another --out, or "
+            "move them away"
         )
 
 

@@ -20,8 +20,8 @@ from bootifol.devices import chosen_device
 from bootifol.errors import BootifolError, EnvironmentFailed
 from bootifol.evaluation.tables import drop_later_rows
 from bootifol.memory import keep_freed_memory
-from bootifol.progress import progress
 from bootifol.own_modules import imports_code
+from bootifol.progress import progress
 from bootifol.rewards.registry import check_method
 from bootifol.tracking import Averages, Tracker, cut_metrics
 from bootifol.training.alignment import alignment_phase
@@ -162,9 +162,7 @@ class Run:
         if newest_checkpoint(self.directory / "checkpoints") is None:
             return f"There is no checkpoint yet in {self.directory}: start again"
         trust = " --trust" if imports_code(self.run.task) or imports_code(self.run.method) else ""
-        return (
-            f"Go on from the last checkpoint with: bootifol train --resume {shlex.quote(str(self.directory))}{trust}"
-        )
+        return f"Go on from the last checkpoint with: bootifol train --resume {shlex.quote(str(self.directory))}{trust}"
 
     def _align(self, interruption: Interruption) -> bool:
         if not (self.budget.alignment_ended(self.counters) or self.counters.agent_steps):
@@ -318,7 +316,9 @@ class Run:
         """Not on opening a run, for benchmarks open runs that are in progress."""
         missing = cut_metrics(self.directory / "metrics.jsonl", self._metrics_bytes)
         if missing:
-            self.console.print(f"metrics.jsonl lacks {missing:,} bytes of what was logged before the checkpoint")
+            self.console.print(
+                f"metrics.jsonl lacks {missing:,} bytes of what was logged before the checkpoint"
+            )
         drop_later_rows(self.directory, self.counters.agent_steps)
 
     def _checkpoint_if_due(self) -> None:
@@ -331,7 +331,10 @@ class Run:
         save_checkpoint(
             self.directory / "checkpoints",
             Progress(self.counters, dict(self.rng.bit_generator.state), self._metrics_bytes),
-            {**self.components.stateful(), **({"episode": self.interactive} if self.interactive.in_progress else {})},
+            {
+                **self.components.stateful(),
+                **({"episode": self.interactive} if self.interactive.in_progress else {}),
+            },
         )
         save_policy(
             self.directory, self.run, self.environment, self.components.agent, self.counters.agent_steps
