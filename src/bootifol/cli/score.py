@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from bootifol.cli.arguments import RunPath, Trust, VideoPaths
 
@@ -41,13 +42,13 @@ def score(
             shown.append((video, of_video))
     table = Table("video", "steps", "mean reward a step", "sum")
     for name, of_video in rewards.items():
-        table.add_row(name, str(len(of_video)), f"{of_video.mean():.4f}", f"{of_video.sum():.2f}")
+        table.add_row(Text(name), str(len(of_video)), f"{of_video.mean():.4f}", f"{of_video.sum():.2f}")
     Console().print(table)
     if out is not None:
         write_scores(out, rewards)
-        Console().print(f"every step's reward: {out}")
+        Console().print(f"every step's reward: {out}", markup=False)
     if picture is not None:
         save_png(rewards_above_film_strips(shown), picture)
         left_out = f" (of the first {len(shown)} videos)" if len(rewards) > len(shown) else ""
-        Console().print(f"rewards above film strips: {picture}{left_out}")
+        Console().print(f"rewards above film strips: {picture}{left_out}", markup=False)
     return 0

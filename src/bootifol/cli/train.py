@@ -80,7 +80,8 @@ def train(
                 f"--resume goes on with the configuration that {resume} was begun with and would ignore "
                 f"{', '.join(ignored)}: leave out all but --resume, or begin a new run with --demos and --out"
             )
-        return 0 if continue_run(resume, bool(trust)) else STOPPED
+        finished = continue_run(resume, trust=True) if trust else continue_run(resume)
+        return 0 if finished else STOPPED
     if demos is None or out is None:
         name = task or "TASK"
         videos = (

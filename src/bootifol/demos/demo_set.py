@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -25,7 +26,9 @@ class DemoSet:
         """Opens the shards that `manifest` lists; use `DemoSet.open` for a directory."""
         self.path = path
         self.manifest = manifest
-        self._shards = [open_shard(path, shard, manifest) for shard in manifest.shards]
+        firsts = itertools.accumulate((shard.videos for shard in manifest.shards), initial=0)
+        shards = zip(manifest.shards, firsts, strict=False)
+        self._shards = [open_shard(path, shard, manifest, first) for shard, first in shards]
         self._places = [
             (shard, row) for shard, opened in enumerate(self._shards) for row in range(opened.videos)
         ]

@@ -79,10 +79,10 @@ class OpenShard:
     videos: int
     offset: int
     """Bytes before the first video."""
-    sha256: str
-    """What the manifest says of the whole file."""
-    stamps: set[tuple[int, ...]]
-    """Of the file when it was opened, and when it was seen to hold the same bytes still."""
+    checksums: tuple[str, ...]
+    """Of each video's pixels, as the manifest has them."""
+    stamp: tuple[int, ...]
+    """Of the file when it was opened: while it is the same, nobody has written to it."""
 
     def read(self, row: int, frames: Frames) -> None:
         """Fills `frames`, uint8 `[T + 1, H, W, 3]` in one piece of memory, with video `row`.
@@ -94,14 +94,7 @@ class OpenShard:
             with self.path.open("rb") as file:
                 file.seek(self.offset + row * frames.nbytes)
                 complete = file.readinto(frames.data) == frames.nbytes
-                stamp = _stamp(os.fstat(file.fileno()))
-                if complete and stamp not in self.stamps:
-                    if sha256_of_file(self.path) != self.sha256:
-                        raise BootifolError(
-                            f"{self.path} was replaced or changed while it was in use: put back the videos that were "
-                            "learned from"
-                        )
-                    self.stamps.add(stamp)
+                changed = _stamp(os.fstat(file.fileno())) != self.stamp
         except OSError as error:
             raise BootifolError(
                 f"{self.path} cannot be read any more: {error}; restore it and run the command again"
@@ -110,10 +103,20 @@ class OpenShard:
             raise BootifolError(
                 f"{self.path} has become shorter while it was in use: restore it or record the set again"
             )
+        if changed and sha256_of_frames(frames) != self.checksums[row]:
+            raise BootifolError(
+                f"{self.path} was replaced or changed while it was in use: put back the videos that were learned from"
+            )
 
 
-def open_shard(directory: Path, shard: Shard, manifest: Manifest) -> OpenShard:
+def open_shard(directory: Path, shard: Shard, manifest: Manifest, first: int) -> OpenShard:
     """Makes the checks of a shard that cost nothing; only its header is read.
+
+    Args:
+        directory: of the demo set.
+        shard: see there.
+        manifest: of the set.
+        first: number of the shard's first video in it.
 
     Raises:
         BootifolError: the file is missing, has another size than the manifest says, or another shape or type.
@@ -149,7 +152,8 @@ def open_shard(directory: Path, shard: Shard, manifest: Manifest) -> OpenShard:
             f"{path} is damaged: {size - offset:,} bytes follow its header, which promises "
             f"{math.prod(expected):,}; restore it or record the set again"
         )
-    return OpenShard(path, shard.videos, offset, shard.sha256, {_stamp(status)})
+    checksums = tuple(video.sha256 for video in manifest.videos[first : first + shard.videos])
+    return OpenShard(path, shard.videos, offset, checksums, _stamp(status))
 
 
 def _stamp(status: os.stat_result) -> tuple[int, ...]:
