@@ -68,6 +68,8 @@ class _Dropping:
             pass
         except (OSError, ValueError):  # the latter where it is closed
             with suppress(OSError, ValueError):
-                nowhere = os.open(os.devnull, os.O_WRONLY)
-                os.dup2(nowhere, self._stream.fileno())  # what waits in the stream's buffer goes there
-                os.close(nowhere)
+                number, nowhere = self._stream.fileno(), os.open(os.devnull, os.O_WRONLY)
+                if nowhere != number:  # it is, where the stream's own was closed
+                    os.dup2(nowhere, number)
+                    os.close(nowhere)
+                self._stream.flush()  # what waits in its buffer goes there

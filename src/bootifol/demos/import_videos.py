@@ -228,7 +228,7 @@ def _resampled(source: Source, frames_per_second: float | None) -> Iterator[Fram
             gap = seconds - since
             if _instants_before(seconds, frames_per_second) - emitted > LONGEST_STILL:
                 raise BootifolError(
-                    f"{source} shows one picture for {gap:,.0f} s, {frames_per_second:g} times a second: its time stamps "
+                    f"{source} shows one picture for {gap:,.0f} s, {frames_per_second:g} times a second: its times "
                     "are damaged, or the rate is too high; export it again, or import it without --fps"
                 )
             for _ in range(emitted, _instants_before(seconds, frames_per_second)):
