@@ -45,8 +45,6 @@ def test_a_changed_bit_anywhere_in_arrays_is_found(tmp_path: Path) -> None:
     for flipped in every_flip(path):
         with pytest.raises(BootifolError, match="damaged"):
             read_arrays(flipped, "it")
-        with pytest.raises(BootifolError, match="damaged"):
-            read_texts(flipped, "it")
 
 
 def test_a_changed_bit_anywhere_in_sealed_json_is_found(tmp_path: Path) -> None:
@@ -54,7 +52,7 @@ def test_a_changed_bit_anywhere_in_sealed_json_is_found(tmp_path: Path) -> None:
     write_json(path, {"format": 2, "counters": [1, 2.5, "x"]}, sealed=True)
     assert read_json(path, "it") == {"format": 2, "counters": [1, 2.5, "x"]}
     for flipped in every_flip(path):
-        with pytest.raises(BootifolError, match="it cannot be read|is damaged"):
+        with pytest.raises(BootifolError, match=r"it cannot be read|is damaged"):
             read_json(flipped, "it")
 
 
