@@ -28,6 +28,7 @@ from tests.training.tiny_runs import ENDS_SOON, new_run, record_demos
 from benchmarks.command import command
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.errors import BootifolError
+from bootifol.reports.comparison import compare
 from bootifol.reports.findings import findings
 from bootifol.reports.run_files import flattened, read_run
 from bootifol.training.checkpoint import load_checkpoint, newest_checkpoint
@@ -91,6 +92,8 @@ def wild_text(draw: st.DrawFn, text: str) -> str:
 def opened(run: Path, demos: Path) -> dict[str, Callable[[], object]]:
     """Everything that reads one of the files, by what it reads."""
 
+    whole = read_run(run)
+
     def configuration() -> object:
         config = RunConfig.read(run)
         require_same_videos(run, config)
@@ -98,6 +101,7 @@ def opened(run: Path, demos: Path) -> dict[str, Callable[[], object]]:
 
     def report() -> object:
         files = read_run(run)
+        compare([files, whole], unfinished=True)
         return findings(files), list(flattened(files.config)), files.agent_steps
 
     def index() -> object:
