@@ -17,6 +17,7 @@ import signal
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -25,7 +26,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from tests.training.tiny_runs import ENDS_SOON, new_run, record_demos
+from tests.training.tiny_runs import ENDS_SOON, new_run, record_demos, resumed
 from torch.utils.tensorboard import SummaryWriter
 
 from benchmarks.command import command
@@ -37,10 +38,11 @@ from bootifol.cli.main import main as bootifol
 from bootifol.demos.demo_set import DemoSet
 from bootifol.errors import STOPPED, BootifolError
 from bootifol.files import read_arrays, read_json
+from bootifol.output import output_may_fail
 from bootifol.reports.markdown import markdown_table
-from bootifol.training.api import continue_run
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.interactive import InteractivePhase
+from bootifol.training.run_directory import require_resumable, require_unused, writing_run
 
 CONFIG = replace(ENDS_SOON, tensorboard=True)
 COLUMNS = ("promise", "tries", "held")
@@ -83,7 +85,7 @@ def in_a_process(work: Callable[[], object], output: int | None = None) -> int:
     process = os.fork()
     if process:
         return process
-    code = TRACEBACK
+    code, said = TRACEBACK, os.dup(2)
     try:
         nowhere = os.open(os.devnull, os.O_WRONLY) if output is None else output
         os.dup2(nowhere, 1)
@@ -93,6 +95,8 @@ def in_a_process(work: Callable[[], object], output: int | None = None) -> int:
         code = finished if type(finished) is int else 0 if finished else STOPPED
     except BootifolError:
         code = SENTENCE
+    except BaseException:
+        os.write(said, traceback.format_exc().encode())
     finally:
         os._exit(code)
 
@@ -103,10 +107,13 @@ def ended(process: int) -> int:
 
 
 def train(attack: Attack, run: Path) -> bool:
-    """Begins the run, or goes on with it."""
-    if not (run / "config.json").exists():
-        new_run(run, attack.demos, config=CONFIG)
-    return continue_run(run)
+    """Begins the run, or goes on with it, as `bootifol train` does, but without its last measurements and report."""
+    with output_may_fail(), writing_run(run):
+        if (run / "config.json").exists():
+            require_resumable(run)
+            return resumed(run).learn()
+        require_unused(run)
+        return new_run(run, attack.demos, config=CONFIG).learn()
 
 
 @contextmanager
@@ -235,6 +242,7 @@ def pipes_that_close(attack: Attack, tries: int) -> tuple[int, int]:
     held = 0
     for number in range(tries):
         run = attack.new_place("piped")
+        new_run(run, attack.demos, config=CONFIG)
         reader, writer = os.pipe()
         sent = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[number % 3]
         episode = int(attack.rng.integers(0, 2))
@@ -251,7 +259,6 @@ def pipes_that_close(attack: Attack, tries: int) -> tuple[int, int]:
                 play(self)
 
             InteractivePhase.play_episode = play_and_stop  # type: ignore[method-assign]
-            new_run(run, attack.demos, config=CONFIG)
             return bootifol(["train", "--resume", str(run)])
 
         process = in_a_process(stopped, writer)
@@ -361,7 +368,7 @@ def two_writers(attack: Attack, tries: int) -> tuple[int, int]:
                 play(self)
 
             InteractivePhase.play_episode = play_and_tell  # type: ignore[method-assign]
-            return continue_run(run)
+            return train(attack, run)
 
         process = in_a_process(first)
         os.read(began, 1)
@@ -413,9 +420,8 @@ def main() -> int:
     rows = []
     try:
         demos, whole = record_demos(directory / "demos"), directory / "whole"
-        new_run(whole, demos, config=CONFIG)
-        continue_run(whole)
         attack = Attack(directory, demos, whole, np.random.default_rng(arguments.seed))
+        train(attack, whole)
         for promise, (run, tries) in ATTACKS.items():
             done, held = run(attack, max(1, round(arguments.share * tries)))
             rows.append({"promise": promise, "tries": str(done), "held": str(held)})
