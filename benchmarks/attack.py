@@ -220,7 +220,10 @@ def full_disk(attack: Attack, tries: int) -> tuple[int, int]:
     """No space left at one write after another: a sentence, and the run goes on when there is space again."""
     with at_call(0, lambda: None) as calls:
         train(attack, attack.new_place("counted"))
-    places = np.unique(np.linspace(1, len(calls), tries).astype(int))
+    writes = [
+        number for number, name in enumerate(calls, start=1) if name != "rmtree"
+    ]  # which needs no space
+    places = [writes[index] for index in np.unique(np.linspace(0, len(writes) - 1, tries).astype(int))]
 
     def no_space() -> NoReturn:
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -228,12 +231,10 @@ def full_disk(attack: Attack, tries: int) -> tuple[int, int]:
     held = 0
     for number in places:
         run = attack.new_place("full")
-        work = partial(_with_act, int(number), no_space, partial(train, attack, run))
+        work = partial(_with_act, number, no_space, partial(train, attack, run))
         code = ended(in_a_process(work))
-        # What is only tidied away, such as an older checkpoint, may stay for the next time.
-        told = code == SENTENCE or (code == 0 and calls[number - 1] in ("rmtree", "mkdir"))
         again = ended(in_a_process(partial(train, attack, run)))
-        held += told and again == 0 and attack.is_as_whole(run)
+        held += code == SENTENCE and again == 0 and attack.is_as_whole(run)
     return len(places), held
 
 
@@ -398,10 +399,10 @@ ATTACKS: dict[str, tuple[Callable[[Attack, int], tuple[int, int]], int]] = {
     "killed at a rename, a sync or a write": (kills_at_writes, 60),
     "killed at a random moment": (kills_at_moments, 40),
     "one bit of a loaded file changed": (flips, 300),
-    "no space left at a write": (full_disk, 60),
-    "stopped when nobody reads the output": (pipes_that_close, 24),
+    "no space left at a write": (full_disk, 40),
+    "stopped when nobody reads the output": (pipes_that_close, 12),
     "a stranger's file names code": (strangers_names, 48),
-    "two writers to one run": (two_writers, 10),
+    "two writers to one run": (two_writers, 6),
     "wild texts in place of JSON": (wild_files, 800),
 }
 """Attacks by what they are told as, and how often each is tried."""

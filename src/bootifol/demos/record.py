@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, get_args
@@ -175,7 +175,8 @@ def record(
             "the other behaviors with `--behaviors random`"
         )
     out = Path(out)
-    with one_writer(out):
+    only_read = (out / MANIFEST_NAME).exists() and not os.access(out, os.W_OK)
+    with nullcontext() if only_read else one_writer(out):
         remove_leftovers(out)
         return _record(out, performed, behavior, episodes, pictures, seed, workers)
 
