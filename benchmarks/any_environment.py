@@ -216,14 +216,14 @@ def main() -> None:
         typed("demos", "import", str(videos), "--out", str(demos), *shape, "--windows", "first")
     typed("demos", "check", str(demos), "--task", example.task, *lengths)
     if (run / "config.json").exists():
-        typed("train", "--resume", str(run))
+        typed("train", "--resume", str(run), "--trust")
     else:
         typed(
             *("train", "--task", example.task, *lengths, "--demos", str(demos), "--out", str(run)),
             *("--preset", arguments.preset, "--time-budget", arguments.time_budget),
             *("--threads", arguments.threads),
         )
-    typed("evaluate", str(run), "--episodes", "10")
+    typed("evaluate", str(run), "--episodes", "10", "--trust")
     typed("tasks", example.task, "--measure", "10")
 
 

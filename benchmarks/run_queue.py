@@ -31,6 +31,7 @@ from benchmarks.suites import OPTIMAL_TRANSPORT, RANDOM, VIDEOS, PlannedRun, dem
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.errors import STOPPED, BootifolError
 from bootifol.files import written_aside
+from bootifol.own_modules import imports_code
 from bootifol.progress import duration
 from bootifol.training.budget import parse_duration
 from bootifol.training.config import TrainingConfig
@@ -221,6 +222,8 @@ class RunQueue:
             command = [sys.executable, "-m", "benchmarks.random_policy", *words]
         elif resumes:
             command = [*self.program, "train", "--resume", str(directory)]
+            if imports_code(run.task) or imports_code(run.system.method):
+                command.append("--trust")
         process, log_begins = self._start(command, log_file(directory), lock)
         if core is not None:
             with suppress(ProcessLookupError):  # it may have ended already

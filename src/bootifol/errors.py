@@ -2,11 +2,29 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import reprlib
 import typing
 
 STOPPED = 130
 """Exit code of a command that was asked to stop before its end, as shells give it after Ctrl-C."""
+
+
+_brief = reprlib.Repr()
+_brief.maxlevel, _brief.maxstring, _brief.maxother = 3, 200, 200
+
+
+LARGEST_SEED = 2**63 - 1
+"""What every generator of random numbers that is seeded takes."""
+
+LARGEST_COUNT = 10**9
+"""No setting that counts something is larger."""
+
+MOST_THREADS = 1024
+
+LONGEST_EPISODE = 100_000
+"""Agent steps; its pictures alone would take gigabytes."""
 
 
 class BootifolError(Exception):
@@ -14,6 +32,27 @@ class BootifolError(Exception):
 
     The command line prints it without a traceback and exits with code 2.
     """
+
+
+class EnvironmentFailed(BootifolError):  # noqa: N818
+    """An environment raised an error of its own. Who acts in it is none the worse: what was learned is whole."""
+
+
+def shortened(value: object) -> str:
+    """A value out of somebody's file as a sentence can hold it."""
+    text = _brief.repr(value)
+    return text if len(text) <= 300 else f"{text[:300]}…"
+
+
+def printable(text: str) -> str:
+    """A sentence without what would steer a terminal, which a stranger's name in it may hold."""
+    return "".join(sign if sign.isprintable() or sign in "\n\t" else f"\\x{ord(sign):02x}" for sign in text)
+
+
+def is_lack_of_memory(error: BaseException) -> bool:
+    """Whether an error says that an array or a tensor does not fit in memory; PyTorch's has no class of its own."""
+    words = ("allocate memory", "out of memory", "Storage size calculation overflowed", "numel")
+    return isinstance(error, MemoryError) or any(word in str(error) for word in words)
 
 
 def fields_of(what: str, config: object, *names: str) -> dict[str, float]:
@@ -30,7 +69,37 @@ def require_at_least(minimum: float, **fields: float) -> None:
     """
     for name, value in fields.items():
         if not minimum <= value < math.inf:
-            raise BootifolError(f"{name} must be at least {minimum}, not {value}")
+            raise BootifolError(f"{name} must be at least {minimum}, not {shortened(value)}")
+
+
+def require_at_most(maximum: float, **fields: float) -> None:
+    """Refuses numbers above a maximum; NaN, too.
+
+    Raises:
+        BootifolError: names the first such field.
+    """
+    for name, value in fields.items():
+        if not value <= maximum:
+            raise BootifolError(f"{name} must be at most {maximum:,}, not {shortened(value)}")
+
+
+def require_reasonable(of: str, config: object) -> None:
+    """Refuses whole numbers above `LARGEST_COUNT` and numbers that are not finite, in a configuration and in those
+    inside it.
+
+    Args:
+        of: the configuration's name, or nothing.
+        config: a dataclass.
+
+    Raises:
+        BootifolError: names the field, dotted as on the command line.
+    """
+    for field in dataclasses.fields(config):  # type: ignore[arg-type]
+        name, value = f"{of}.{field.name}".lstrip("."), getattr(config, field.name)
+        if dataclasses.is_dataclass(value):
+            require_reasonable(name, value)
+        elif isinstance(value, int | float) and not -LARGEST_COUNT <= value <= LARGEST_COUNT:
+            raise BootifolError(f"{name} is {shortened(value)}, beyond all that is possible: choose another")
 
 
 def require_positive(**fields: float) -> None:

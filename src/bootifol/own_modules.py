@@ -1,4 +1,8 @@
-"""What users write in modules of their own and name as `MODULE:NAME`: environments and reward methods."""
+"""What users write in modules of their own and name as `MODULE:NAME`: environments and reward methods.
+
+Such a name is code. One that a person typed is imported; one that stands in a file is not, unless a person allows it:
+the file may be a stranger's.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +15,43 @@ from typing import Any
 
 from bootifol.errors import BootifolError
 
+_allowed: set[str] = set()
+"""Names that were imported in this process already, so somebody typed or trusted them."""
+
 
 def is_own_name(name: str) -> bool:
     """Whether a name has the form MODULE:NAME, such as my_package.my_module:make."""
     module_name, colon, attribute = name.partition(":")
     return bool(colon) and all(part.isidentifier() for part in (*module_name.split("."), attribute))
+
+
+def imports_code(name: str) -> bool:
+    """Whether Python imports a module to make what a task or a method names: MODULE:NAME, or gymnasium:PACKAGE:ID."""
+    return ":" in name.removeprefix("gymnasium:")
+
+
+def require_trust(path: Path, what: str, name: str, trust: bool) -> None:
+    """Refuses a name out of a file that would be imported, unless a person typed it in this process, or trusts it.
+
+    Args:
+        path: the file.
+        what: it names, such as "task".
+        name: what it is called.
+        trust: whether a person allowed that what the file names is imported.
+
+    Raises:
+        BootifolError: nobody did.
+    """
+    if imports_code(name) and not trust and name not in _allowed:
+        raise BootifolError(
+            f"{path} names the {what} {name!r}, which is code of its author's, and none of it was run: if you know "
+            "that code and trust it, add --trust (from Python trust=True)"
+        )
+
+
+def allow(name: str) -> None:
+    """Remembers a name that is about to be imported: who asked for it once need not say so again."""
+    _allowed.add(name)
 
 
 def own_callable(name: str, kind: str) -> Callable[..., Any]:
@@ -29,6 +65,11 @@ def own_callable(name: str, kind: str) -> Callable[..., Any]:
         BootifolError: there is no such module, it cannot be imported, or it has nothing callable of that name.
     """
     module_name, _, attribute = name.partition(":")
+    if _is_of_python(module_name):
+        raise BootifolError(
+            f"{name} is no {kind}: {module_name} is a part of Python itself; name a module of your own"
+        )
+    allow(name)
     here = str(Path.cwd())
     if here not in sys.path:
         sys.path.insert(0, here)
@@ -41,7 +82,7 @@ def own_callable(name: str, kind: str) -> Callable[..., Any]:
                 "go to the directory it lies in, or install it"
             ) from error
         raise BootifolError(f"{name} needs a package that is missing: {told(error)}; install it") from error
-    except Exception as error:  # a module may do anything when it is imported
+    except (Exception, SystemExit) as error:  # a module may do anything when it is imported
         raise BootifolError(f"{module_name} cannot be imported: {told(error)}{where(error)}") from error
     found = getattr(module, attribute, None)
     if not callable(found):
@@ -62,6 +103,14 @@ def where(error: BaseException) -> str:
     """File and line that an exception comes from."""
     last = traceback.extract_tb(error.__traceback__)[-1]
     return f" ({type(error).__name__} in {Path(last.filename).name}, line {last.lineno})"
+
+
+def _is_of_python(module_name: str) -> bool:
+    """Whether a module belongs to Python's own library, which makes neither environments nor reward methods; a file of
+    the same name in the current directory goes first."""
+    top = module_name.partition(".")[0]
+    in_the_way = Path(top).is_dir() or Path(f"{top}.py").is_file()
+    return top in sys.builtin_module_names or (top in sys.stdlib_module_names and not in_the_way)
 
 
 def _is_own(value: object, module_name: str) -> bool:

@@ -47,11 +47,11 @@ def progress(description: str, total: int, done: int = 0, unit: str = "") -> Ite
         return
 
     bar = Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         _Count(unit),
         _RateAndRemaining(unit),
-        TextColumn("{task.fields[shown]}", style="dim"),
+        TextColumn("{task.fields[shown]}", style="dim", markup=False),
         console=console,
     )
     task = bar.add_task(description, total=total, completed=done, shown="")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.pixels import PixelEnvironment, Simulator
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.errors import LONGEST_EPISODE, BootifolError, require_at_least, require_at_most
 
 if TYPE_CHECKING:
     from bootifol.envs.any_gymnasium import GymnasiumSimulator
@@ -216,6 +216,7 @@ def task_named(
     if not changes:
         return task
     require_at_least(1, **changes)
+    require_at_most(LONGEST_EPISODE, **changes)
     repeat = changes.get("action_repeat", task.action_repeat)
     changed = replace(
         task,

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import time
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -13,7 +17,10 @@ from torch.utils.tensorboard import SummaryWriter
 
 from bootifol.devices import to_floats
 from bootifol.errors import BootifolError
+from bootifol.files import parsed_json
 from bootifol.types import Metrics, StepMetrics
+
+_PIECE = 1 << 16
 
 
 class Averages:
@@ -48,16 +55,28 @@ class Averages:
 class Tracker:
     """Writes `metrics.jsonl` and TensorBoard event files into a run's directory.
 
+    A line is in the file when `log` returns. TensorBoard shows what `metrics.jsonl` holds: where event files are there
+    already, of a run that goes on, they are written anew from it, without what was undone.
+
     Args:
         directory: the run's directory.
         tensorboard: whether to write event files under `directory/tensorboard`.
+
+    Raises:
+        BootifolError: the files cannot be written; so do all methods.
     """
 
     def __init__(self, directory: Path, tensorboard: bool = True) -> None:
-        directory.mkdir(parents=True, exist_ok=True)
         self.path = directory / "metrics.jsonl"
-        self._file = self.path.open("a")
-        self._writer = SummaryWriter(str(directory / "tensorboard")) if tensorboard else None
+        self._events = directory / "tensorboard"
+        self._writer: SummaryWriter | None = None
+        with self._errors():
+            directory.mkdir(parents=True, exist_ok=True)
+            if self.path.exists() and not self.path.is_file():
+                raise OSError(f"{self.path} is no file")
+            self._file = self.path.open("ab", buffering=0)
+            if tensorboard:
+                self._begin_events()
 
     def log(self, phase: str, count_name: str, count: int, seconds: float, metrics: Metrics) -> None:
         """Logs metrics of one moment.
@@ -71,20 +90,72 @@ class Tracker:
         """
         line = {"phase": phase, count_name: count, "seconds": round(seconds, 3)}
         numbers = {name: float(value) if math.isfinite(value) else None for name, value in metrics.items()}
-        self._file.write(json.dumps(line | numbers) + "\n")
-        self._file.flush()
-        if self._writer is not None:
-            for name, value in metrics.items():
-                self._writer.add_scalar(f"{phase}/{name}", value, count)
+        with self._errors():
+            self._append((json.dumps(line | numbers) + "\n").encode())
+            if self._writer is not None:
+                for name, value in metrics.items():
+                    self._writer.add_scalar(f"{phase}/{name}", value, count)
 
     def bytes_written(self) -> int:
-        """Size of `metrics.jsonl`, which a checkpoint keeps so that a resumed run goes on from there."""
-        return self._file.tell()
+        """Size of `metrics.jsonl`, which a checkpoint keeps so that a resumed run goes on from there.
+
+        So many bytes are on the disk, whatever happens to the machine, before any checkpoint says so.
+        """
+        with self._errors():
+            os.fsync(self._file.fileno())
+            return os.fstat(self._file.fileno()).st_size
 
     def close(self) -> None:
-        self._file.close()
-        if self._writer is not None:
-            self._writer.close()
+        with self._errors():
+            self._file.close()
+            if self._writer is not None:
+                self._writer.close()
+
+    def _append(self, line: bytes) -> None:
+        """Appends a whole line, or nothing."""
+        before = os.fstat(self._file.fileno()).st_size
+        rest = memoryview(line)
+        try:
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError:
+            with suppress(OSError):
+                self._file.truncate(before)
+            raise
+
+    def _begin_events(self) -> None:
+        earlier = sorted(self._events.glob("events.out.tfevents.*"))
+        for file in earlier:
+            file.unlink()
+        self._writer = SummaryWriter(str(self._events))
+        if earlier:
+            self._repeat_metrics(self._writer)
+
+    def _repeat_metrics(self, writer: SummaryWriter) -> None:
+        """Writes what `metrics.jsonl` holds as events, at times that lie as far apart as then."""
+        records = []
+        for line in self.path.read_text(errors="replace").splitlines():
+            with suppress(ValueError):
+                record = parsed_json(line)
+                if isinstance(record, dict) and isinstance(record.get("seconds"), int | float):
+                    records.append(record)
+        began = time.time() - max((record["seconds"] for record in records), default=0.0)
+        for record in records:
+            phase, seconds = record.pop("phase", ""), record.pop("seconds")
+            counts = [record.pop(name) for name in ("gradient_step", "agent_steps") if name in record]
+            for name, value in record.items():
+                if counts and isinstance(value, int | float):
+                    writer.add_scalar(f"{phase}/{name}", value, counts[0], walltime=began + seconds)
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise BootifolError(
+                f"the metrics cannot be written to {self.path.parent}: {error}; free some space, or see who may write "
+                "there"
+            ) from error
 
     def __enter__(self) -> Tracker:
         return self
@@ -96,3 +167,39 @@ class Tracker:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def cut_metrics(path: Path, size: int) -> int:
+    """Cuts `metrics.jsonl` back to the whole lines among its first bytes; a shorter file is not made longer.
+
+    Args:
+        path: the file; there may be none.
+        size: how many bytes are kept at most.
+
+    Returns:
+        How many bytes are missing, because the file is shorter or a line among them is not whole.
+
+    Raises:
+        BootifolError: the file cannot be changed.
+    """
+    if not path.exists():
+        return size
+    try:
+        if not path.is_file():
+            raise OSError("it is no file")
+        with path.open("r+b") as file:
+            file.truncate(min(size, os.fstat(file.fileno()).st_size))
+            kept = file.seek(0, os.SEEK_END)
+            while kept:
+                first = max(kept - _PIECE, 0)
+                file.seek(first)
+                if (newline := file.read(kept - first).rfind(b"\n")) >= 0:
+                    kept = first + newline + 1
+                    break
+                kept = first
+            file.truncate(kept)
+    except OSError as error:
+        raise BootifolError(
+            f"{path} cannot be cut back to the checkpoint: {error}; see who may write there, or copy the run"
+        ) from error
+    return size - kept

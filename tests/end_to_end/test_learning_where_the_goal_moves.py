@@ -49,7 +49,9 @@ def demos(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def return_after_learning(demos: Path, directory: Path, blind: bool) -> float:
-    run = Run(RunConfig(TASK, "bootifol", "drawn", 1, str(demos), None, CONFIG), directory, Console(quiet=True))
+    run = Run(
+        RunConfig(TASK, "bootifol", "drawn", 1, str(demos), None, CONFIG), directory, Console(quiet=True)
+    )
     if blind:
         run.components.reward_model.__class__ = BlindReward
     assert run.learn()

@@ -1,5 +1,8 @@
 import base64
+import hashlib
+import os
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -202,3 +205,28 @@ def test_nested_configurations_are_flattened() -> None:
         ("a.c.d", "None"),
         ("e", "[1, 2]"),
     ]
+
+
+def test_what_a_link_leads_to_outside_of_the_run_is_not_shown(run_dir: Path, tmp_path: Path) -> None:
+    secret = tmp_path / "secret.mp4"
+    secret.write_bytes(b"a secret of this machine's")
+    for name, target in (("agent-0", secret), ("agent-1", Path("agent-1.mp4")), ("agent-2", Path("nowhere"))):
+        (run_dir / "videos" / f"{name}.mp4").unlink()
+        (run_dir / "videos" / f"{name}.mp4").symlink_to(target)
+    (run_dir / "videos" / "expert-0.mp4").unlink()
+    os.mkfifo(run_dir / "videos" / "expert-0.mp4")
+    shutil.move(run_dir / "showcase.safetensors", tmp_path / "showcase.safetensors")
+    (run_dir / "showcase.safetensors").symlink_to(tmp_path / "showcase.safetensors")
+    page = Page(report([run_dir], tmp_path / "report.html"))
+    assert base64.b64encode(secret.read_bytes()).decode() not in page.source
+    assert page.text.count("it is a link that leaves the run") == 4
+    assert "videos/expert-0.mp4 was left out" in page.text
+    assert len([tag for tag, _ in page.loaded if tag == "video"]) == 2
+
+
+def test_the_page_runs_its_own_script_alone_and_asks_for_nothing(page: Page) -> None:
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page.source)
+    assert policy is not None and "default-src 'none'" in policy[1]
+    (script,) = re.findall(r"<script>(.*?)</script>", page.source, re.DOTALL)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in policy[1]

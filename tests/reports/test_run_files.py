@@ -1,4 +1,5 @@
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ from synthetic_run import AGENT_STEPS, EXPERT_RETURN, RANDOM_RETURN
 
 from bootifol.errors import BootifolError
 from bootifol.files import read_arrays, write_arrays
-from bootifol.reports.run_files import read_run
+from bootifol.reports.run_files import find_runs, read_run
 
 
 def test_a_whole_run_is_read_without_notes(shared_run: Path) -> None:
@@ -113,3 +114,29 @@ def test_a_broken_configuration_is_a_sentence(run_dir: Path, content: str | None
 def test_no_directory_is_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(BootifolError, match="there is no run directory"):
         read_run(tmp_path / "nowhere")
+
+
+def test_links_in_circles_are_looked_into_once(shared_run: Path, tmp_path: Path) -> None:
+    runs = tmp_path / "runs"
+    (runs / "deep").mkdir(parents=True)
+    (runs / "arm-1").symlink_to(shared_run)
+    for name, target in (
+        ("again", runs),
+        ("deep/up", runs),
+        ("itself", runs / "itself"),
+        ("deep/too", runs / "deep"),
+    ):
+        (runs / name).symlink_to(target)
+    assert find_runs([runs]) == [runs / "again" / "arm-1"] or find_runs([runs]) == [runs / "arm-1"]
+
+
+def test_a_pipe_in_place_of_a_file_holds_nobody_up(run_dir: Path) -> None:
+    for name in ("metrics.jsonl", "evaluations.csv", "showcase.safetensors"):
+        (run_dir / name).unlink()
+        os.mkfifo(run_dir / name)
+    run = read_run(run_dir)
+    assert not run.curves and not run.evaluations and not run.showcase
+    (run_dir / "config.json").unlink()
+    os.mkfifo(run_dir / "config.json")
+    with pytest.raises(BootifolError, match="is no file"):
+        read_run(run_dir)

@@ -104,7 +104,7 @@ def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
         patch.setattr(InteractivePhase, "play_episode", play_and_signal)
         assert not new_run(tmp_path / "parts", demos, config=config).learn()
     rest = resumed(tmp_path / "parts")
-    assert rest.counters.episodes == 5
+    assert (rest.counters.episodes, rest.interactive.steps_in_progress) == (4, 1)
     assert rest.learn()
     for name, component in whole.components.stateful().items():
         expected, found = component.state(), rest.components.stateful()[name].state()

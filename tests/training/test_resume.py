@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import os
 import signal
 from dataclasses import replace
@@ -19,6 +21,7 @@ from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.config import TrainingConfig
 from bootifol.training.demonstrations import Demonstrations
 from bootifol.training.interactive import InteractivePhase
+from bootifol.training.measurements import Measurements
 from bootifol.training.train import Run
 
 
@@ -104,11 +107,87 @@ def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
         signal_at(patch, signal.SIGTERM, episode=4)
         assert not new_run(tmp_path / "parts", demos, method, config).learn()
     rest = resumed(tmp_path / "parts")
-    assert rest.counters.episodes == 5
+    assert (rest.counters.episodes, rest.interactive.steps_in_progress) == (4, 1), (
+        "after a step, not an episode"
+    )
     assert rest.learn()
 
     assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
     np.testing.assert_array_equal(next_actions(whole), next_actions(rest))
+
+
+def metrics_of(run: Path) -> list[dict[str, object]]:
+    """What was logged, without times and without what means of an interrupted line differ in."""
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    kept = ("phase", "gradient_step", "agent_steps")
+    return [
+        {k: v for k, v in line.items() if k in kept or k.startswith(("evaluation", "ranking"))}
+        for line in lines
+    ]
+
+
+def test_stops_at_any_moment_leave_the_uninterrupted_run(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In alignment, while ranking, within episodes, warm-up included, and within an evaluation."""
+    whole = new_run(tmp_path / "whole", demos, config=WITH_DEMONSTRATIONS)
+    assert whole.learn()
+
+    new_run(tmp_path / "parts", demos, config=WITH_DEMONSTRATIONS)
+    moments = [
+        (Run, "_checkpoint_if_due", 4),
+        (Measurements, "rank", 1),
+        (InteractivePhase, "_update_agent", 17),
+        (InteractivePhase, "_update_agent", 25),
+        (DrQv2, "clone", 4),
+        (Measurements, "_play", 1),
+        (InteractivePhase, "_update_agent", 30),
+        (Measurements, "_play", 2),
+        (InteractivePhase, "_update_agent", 40),
+    ]
+    for owner, name, call in moments:
+        with monkeypatch.context() as patch:
+            interrupt_at_call(patch, owner, name, call)
+            assert not resumed(tmp_path / "parts").learn()
+    rest = resumed(tmp_path / "parts")
+    assert rest.learn()
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
+    np.testing.assert_array_equal(next_actions(whole), next_actions(rest))
+    assert metrics_of(tmp_path / "parts") == metrics_of(tmp_path / "whole")
+    for table in ("evaluations.csv", "ranking.csv"):
+        rows = [
+            [cell for number, cell in enumerate(row) if number != 1]  # all but the seconds
+            for row in csv.reader((tmp_path / "parts" / table).read_text().splitlines())
+        ]
+        assert rows == [
+            [cell for number, cell in enumerate(row) if number != 1]
+            for row in csv.reader((tmp_path / "whole" / table).read_text().splitlines())
+        ]
+
+
+def test_an_environment_that_fails_loses_nothing(
+    tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = new_run(tmp_path / "whole", demos)
+    assert whole.learn()
+    run = new_run(tmp_path / "parts", demos)
+    step, calls = run.environment.simulator.step, []
+
+    def failing(action: np.ndarray) -> object:
+        calls.append(action)
+        if len(calls) == 100:
+            raise ZeroDivisionError("the arm fell off")
+        return step(action)
+
+    monkeypatch.setattr(run.environment.simulator, "step", failing)
+    with pytest.raises(
+        BootifolError, match=r"the arm fell off \(ZeroDivisionError in test_resume.py.*--resume"
+    ):
+        run.learn()
+    rest = resumed(tmp_path / "parts")
+    assert rest.counters.agent_steps == 99
+    assert rest.learn()
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
 
 
 def test_a_run_goes_on_with_another_name_of_the_device(

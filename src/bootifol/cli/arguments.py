@@ -18,4 +18,8 @@ VideoPaths = Annotated[
     tyro.conf.Positional,
     tyro.conf.arg(metavar="VIDEO [VIDEO ...]", help_behavior_hint="(one or more)"),
 ]
+Trust = Annotated[
+    tyro.conf.UseCounterAction[int], tyro.conf.arg(metavar="", help_behavior_hint="(default: no)")
+]
+"""A flag without a value."""
 DemosPath = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DEMOS")]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from bootifol.cli.arguments import RunPaths
+from bootifol.cli.arguments import RunPaths, Trust
 from bootifol.errors import BootifolError
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ def evaluate(
     seed: int = 1000,
     out: Path | None = None,
     videos: Path | None = None,
+    trust: Trust = 0,
 ) -> int:
     """Play episodes with the newest policy of one run or several, without exploration, and print their returns.
 
@@ -30,6 +31,7 @@ def evaluate(
         seed: Of the starts.
         out: CSV file to write a row for each episode to.
         videos: Directory to write each episode to, as an mp4; several runs get a directory each in it.
+        trust: Import the code that the runs name as their task (MODULE:NAME); other runs need none.
     """
     # Imported here: help should not wait for PyTorch.
     from bootifol.evaluation.tables import PlayedRow, write_played
@@ -39,7 +41,8 @@ def evaluate(
 
     folders = _checked(runs, out, videos)
     for run in runs:
-        RunConfig.read(run)  # what cannot be played is heard of before another is
+        # What cannot be played is heard of before another is.
+        RunConfig.read(run, bool(trust), needs_method=False)
         require_checkpoint(run)
     console = Console(emoji=False)
     rows: list[PlayedRow] = []
@@ -47,7 +50,7 @@ def evaluate(
     for run, folder in zip(runs, folders, strict=True):
         if len(runs) > 1:
             console.print(str(run), markup=False, soft_wrap=True)
-        result = evaluate_run(run, episodes, seed, folder)
+        result = evaluate_run(run, episodes, seed, folder, bool(trust))
         rows += [PlayedRow(**asdict(row), run=str(run)) for row in result.rows]
         lines.append(f"{run}: {_in_a_line(result)}")
         _print(result, console)

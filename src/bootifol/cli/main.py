@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import functools
-import os
 import sys
 from collections.abc import Callable, Sequence
 
 import tyro
 from rich.console import Console
+from rich.text import Text
 
 from bootifol.cli.help_texts import join_lines
-from bootifol.errors import STOPPED, BootifolError
+from bootifol.errors import STOPPED, BootifolError, is_lack_of_memory, printable
+from bootifol.output import output_may_fail
+from bootifol.own_modules import told
 
 DESCRIPTION = """Videos in, policy out: learns a reward from videos of a task, and trains a pixel policy on it.
 
@@ -38,7 +40,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after bad input, which one sentence explains, or 130 after an interruption.
     """
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    with output_may_fail():
+        return _exit_code(list(sys.argv[1:] if arguments is None else arguments))
+
+
+def _exit_code(words: list[str]) -> int:
     try:
         if words[:1] == ["demos"]:
             return _run(_demos_commands(), words[1:], "bootifol demos", DEMOS_DESCRIPTION)
@@ -46,16 +52,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _run(_experts_commands(), words[1:], "bootifol experts", EXPERTS_DESCRIPTION)
         return _run(_commands(words), words, "bootifol", DESCRIPTION)
     except BootifolError as error:
-        # Without emoji: rich would draw one for the middle of gymnasium:robot:Reach-v0.
-        Console(stderr=True, soft_wrap=True, emoji=False).print(f"[bold red]error:[/] {_escaped(str(error))}")
-        return 2
+        return _refused(str(error))
+    except (MemoryError, RuntimeError) as error:
+        if not is_lack_of_memory(error):
+            raise
+        return _refused(
+            f"this needs more memory than the machine has ({told(error)}): choose fewer or smaller pictures, networks "
+            "or batches"
+        )
     except KeyboardInterrupt:
         Console(stderr=True).print("stopped")
         return STOPPED
-    except BrokenPipeError:
-        # The reader of our output has gone, as `| head` does.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+
+
+def _refused(sentence: str) -> int:
+    # Without emoji: rich would draw one for the middle of gymnasium:robot:Reach-v0.
+    console = Console(stderr=True, soft_wrap=True, emoji=False)
+    console.print(Text.assemble(("error:", "bold red"), f" {printable(sentence)}"))
+    return 2
 
 
 def _run(commands: dict[str, Callable[..., int]], words: list[str], prog: str, description: str) -> int:
@@ -113,7 +127,3 @@ def _experts_placeholder() -> int:
 def _demos_placeholder() -> int:
     """Make, import, check and export sets of videos: demos record, demos import, demos check, demos export."""
     return main(["demos", "--help"])
-
-
-def _escaped(text: str) -> str:
-    return text.replace("[", r"\[")

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from bootifol.cli.arguments import RunPath, VideoPaths
+from bootifol.cli.arguments import RunPath, Trust, VideoPaths
 
 
 def score(
@@ -15,6 +16,7 @@ def score(
     videos: VideoPaths,
     out: Path | None = None,
     picture: Path | None = None,
+    trust: Trust = 0,
 ) -> int:
     """Reward videos with a run's learned reward: one number each, every step's in a CSV file or above film strips.
 
@@ -23,6 +25,7 @@ def score(
         videos: Video files (mp4, webm, gif …), folders of frames, .npy files, LeRobot datasets, or demo sets.
         out: CSV file to write the reward of every step to: columns video, step, reward.
         picture: PNG file to draw the reward of every step to, above the film strips of the first six videos.
+        trust: Import the code that the run names as its task or method (MODULE:NAME); other runs need none.
     """
     from bootifol.reports.film_strip import rewards_above_film_strips
     from bootifol.reports.style import RUN_COLORS, require_png, save_png
@@ -33,19 +36,19 @@ def score(
         require_png(picture)
     rewards: dict[str, Rewards] = {}
     shown: list[tuple[Video, Rewards]] = []
-    for video, of_video in scored_videos(run, videos):
+    for video, of_video in scored_videos(run, videos, bool(trust)):
         rewards[video.name] = of_video
         if picture is not None and len(shown) < len(RUN_COLORS):
             shown.append((video, of_video))
     table = Table("video", "steps", "mean reward a step", "sum")
     for name, of_video in rewards.items():
-        table.add_row(name, str(len(of_video)), f"{of_video.mean():.4f}", f"{of_video.sum():.2f}")
+        table.add_row(Text(name), str(len(of_video)), f"{of_video.mean():.4f}", f"{of_video.sum():.2f}")
     Console().print(table)
     if out is not None:
         write_scores(out, rewards)
-        Console().print(f"every step's reward: {out}")
+        Console().print(f"every step's reward: {out}", markup=False)
     if picture is not None:
         save_png(rewards_above_film_strips(shown), picture)
         left_out = f" (of the first {len(shown)} videos)" if len(rewards) > len(shown) else ""
-        Console().print(f"rewards above film strips: {picture}{left_out}")
+        Console().print(f"rewards above film strips: {picture}{left_out}", markup=False)
     return 0

@@ -9,6 +9,7 @@ import rich.box
 import tyro
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from bootifol.errors import BootifolError
 from bootifol.tasks import TASKS, Task, frames_per_second, short_name, task_named
@@ -36,7 +37,7 @@ def tasks(
     listed = [task_named(name) for name in names] or list(TASKS.values())
     for task in listed:
         catalogue.add_row(
-            task.name,
+            Text(task.name),
             task.suite,
             str(task.action_repeat),
             str(task.episode_steps),
@@ -47,7 +48,7 @@ def tasks(
     console = Console(emoji=False)
     console.print(catalogue)
     for task in listed:
-        console.print(f"{task.name}: {task.description}", highlight=False)
+        console.print(f"{task.name}: {task.description}", highlight=False, markup=False)
     console.print(
         "repeat: simulator steps an agent step; steps, evaluated: agent steps of a training and an evaluation episode; "
         "expert, random: mean returns of evaluation episodes",
@@ -113,7 +114,7 @@ def _measured(listed: Sequence[Task], episodes: int) -> Table:
                     advance(1, mean=float(np.mean(returns)))
             interval = summarize(returns).interval
             table.add_row(
-                task.name,
+                Text(task.name),
                 who,
                 str(episodes),
                 f"{np.mean(returns):.2f} ± {np.std(returns):.2f}",

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import tyro
 
+from bootifol.cli.arguments import Trust
 from bootifol.errors import STOPPED, BootifolError
 from bootifol.presets import PresetName, preset
 from bootifol.tasks import short_name
@@ -45,8 +46,9 @@ def train(
     seed: int = 1,
     time_budget: str | None = None,
     resume: Annotated[
-        Path | None, tyro.conf.arg(metavar="RUN", help_behavior_hint="(no other flags)")
+        Path | None, tyro.conf.arg(metavar="RUN", help_behavior_hint="(no other flags but --trust)")
     ] = None,
+    trust: Trust = 0,
     words: Annotated[tuple[str, ...], tyro.conf.Fixed, tyro.conf.Suppress] = (),
 ) -> int:
     """Learn a reward from videos and train a policy on it, or go on with an interrupted run.
@@ -69,6 +71,7 @@ def train(
         time_budget: Wall-clock time for learning, such as 90s, 45m or 1h30m; schedules are stretched to fit it.
             The final evaluation and the report come after it.
         resume: Directory of an interrupted run to go on with; its own configuration is used.
+        trust: Import the code that RUN, or the videos without --task, name (MODULE:NAME).
         words: What was typed.
     """
     # Imported here: help should not wait for PyTorch.
@@ -76,12 +79,13 @@ def train(
     from bootifol.training.budget import parse_duration
 
     if resume is not None:
-        if ignored := [flag for flag in flags_of(words) if flag != "--resume"]:
+        if ignored := [flag for flag in flags_of(words) if flag not in ("--resume", "--trust")]:
             raise BootifolError(
                 f"--resume goes on with the configuration that {resume} was begun with and would ignore "
                 f"{', '.join(ignored)}: leave out all but --resume, or begin a new run with --demos and --out"
             )
-        return 0 if continue_run(resume) else STOPPED
+        finished = continue_run(resume, trust=True) if trust else continue_run(resume)
+        return 0 if finished else STOPPED
     if demos is None or out is None:
         name = task or "TASK"
         videos = (
@@ -95,7 +99,7 @@ def train(
         )
     seconds = None if time_budget is None else parse_duration(time_budget)
     run = train_policy(
-        task or _task_shown(demos),
+        task or _task_shown(demos, bool(trust)),
         demos,
         out,
         method=method,
@@ -108,17 +112,21 @@ def train(
     return 0 if run.finished else STOPPED
 
 
-def _task_shown(demos: Path) -> str:
+def _task_shown(demos: Path, trust: bool) -> str:
     """The task that recorded videos show; random ones beside imported ones tell it, too.
 
     Raises:
-        BootifolError: nothing there was recorded, or more than one task was.
+        BootifolError: nothing there was recorded, more than one task was, or it is code that nobody trusts.
     """
     from bootifol.demos.demo_set import find_demo_sets
-    from bootifol.demos.manifest import read_manifest
+    from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
+    from bootifol.own_modules import require_trust
 
-    manifests = map(read_manifest, find_demo_sets(demos).values())
-    tasks = {manifest.task for manifest in manifests if manifest.task is not None}
+    tasks: set[str] = set()
+    for directory in find_demo_sets(demos).values():
+        if (task := read_manifest(directory).task) is not None:
+            require_trust(directory / MANIFEST_NAME, "task", task, trust)
+            tasks.add(task)
     if len(tasks) != 1:
         why = "show more than one task" if tasks else "were imported, so nothing says what they show"
         raise BootifolError(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from bootifol.checksums import require_as_written
 from bootifol.demos.manifest import MANIFEST_NAME, Manifest, read_manifest
 from bootifol.demos.shards import open_shard, sha256_of_file, sha256_of_frames
 from bootifol.errors import BootifolError
@@ -24,7 +26,9 @@ class DemoSet:
         """Opens the shards that `manifest` lists; use `DemoSet.open` for a directory."""
         self.path = path
         self.manifest = manifest
-        self._shards = [open_shard(path, shard, manifest) for shard in manifest.shards]
+        firsts = itertools.accumulate((shard.videos for shard in manifest.shards), initial=0)
+        shards = zip(manifest.shards, firsts, strict=False)
+        self._shards = [open_shard(path, shard, manifest, first) for shard, first in shards]
         self._places = [
             (shard, row) for shard, opened in enumerate(self._shards) for row in range(opened.videos)
         ]
@@ -96,31 +100,41 @@ class DemoSet:
         )
 
     def verify(self) -> None:
-        """Reads every byte and compares every checksum, of files and of videos.
+        """Reads every byte and compares every checksum: the manifest's, and those of all files.
 
         Raises:
             BootifolError: naming the file, and the videos in it that differ.
         """
         with progress(f"verifying {self.manifest.name}", total=len(self)) as advance:
-            first = 0
-            for shard in self.manifest.shards:
-                damaged = [
-                    self.manifest.videos[index].name
-                    for index in range(first, first + shard.videos)
-                    if sha256_of_frames(self[index].frames) != self.manifest.videos[index].sha256
-                ]
-                if damaged:
-                    raise BootifolError(
-                        f"{self.path / shard.file} is damaged: the pixels of {listed(damaged)} are not "
-                        "the ones recorded; restore the file or record the set again"
-                    )
-                if sha256_of_file(self.path / shard.file) != shard.sha256:
-                    raise BootifolError(
-                        f"{self.path / shard.file} is damaged: its checksum is not the manifest's, though "
-                        "its videos are whole; restore the file or record the set again"
-                    )
-                first += shard.videos
-                advance(shard.videos)
+            for videos in self.verified_shards():
+                advance(videos)
+
+    def verified_shards(self) -> Iterator[int]:
+        """The same shard by shard, and without a word.
+
+        Yields:
+            How many videos were found to be whole, each time.
+        """
+        require_as_written(self.path / MANIFEST_NAME, "the demo set's manifest")
+        first = 0
+        for shard in self.manifest.shards:
+            damaged = [
+                self.manifest.videos[index].name
+                for index in range(first, first + shard.videos)
+                if sha256_of_frames(self[index].frames) != self.manifest.videos[index].sha256
+            ]
+            if damaged:
+                raise BootifolError(
+                    f"{self.path / shard.file} is damaged: the pixels of {listed(damaged)} are not "
+                    "the ones recorded; restore the file or record the set again"
+                )
+            if sha256_of_file(self.path / shard.file) != shard.sha256:
+                raise BootifolError(
+                    f"{self.path / shard.file} is damaged: its checksum is not the manifest's, though "
+                    "its videos are whole; restore the file or record the set again"
+                )
+            first += shard.videos
+            yield shard.videos
 
 
 class VideoSubset:

@@ -16,6 +16,12 @@ from bootifol.demos.shards import DAMAGED_ARRAY
 from bootifol.demos.upright import TimedFrame, upright_picture
 from bootifol.errors import BootifolError
 
+LARGEST_UNFOLDED = 1_000_000_000
+"""Bytes of an array in an archive, which is read in one piece, above which `LARGEST_RATIO` holds."""
+
+LARGEST_RATIO = 100
+"""Of an array's bytes to those of its archive; what was drawn with few colors has up to about 50."""
+
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
@@ -26,6 +32,8 @@ def stream_folder(path: Path) -> Iterator[TimedFrame]:
         raise BootifolError(f"{path} holds no pictures: a folder should hold one video as png or jpg files")
     size: tuple[int, int] | None = None
     for file in pictures:
+        if not file.is_file():
+            raise BootifolError(f"{file} is no file: take it out of the pictures")
         try:
             with Image.open(file) as picture:
                 frame = upright_picture(picture)
@@ -49,7 +57,7 @@ def pictures_in(folder: Path) -> list[Path]:
 def natural_order(path: Path) -> list[tuple[int, str]]:
     """A key for sorting: `frame2` comes before `frame10`."""
     return [
-        (int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name.lower())
+        (int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", path.name.lower())
     ]
 
 
@@ -81,6 +89,12 @@ def stream_archive(path: Path) -> Iterator[TimedFrame]:
             raise BootifolError(
                 f"{path} holds {len(videos) or 'no'} arrays that could be the video, uint8 [frames, height, "
                 f"width, 3], among {listed or 'nothing'}: save the one video alone"
+            )
+        unfolded = math.prod(inside[videos[0]][0])
+        if unfolded > LARGEST_UNFOLDED and unfolded > LARGEST_RATIO * path.stat().st_size:
+            raise BootifolError(
+                f"{path} unfolds from {path.stat().st_size:,} bytes to {unfolded:,}, which no video does: save the "
+                "video as a .npy file"
             )
         frames = np.load(path, allow_pickle=False)[videos[0]]
     except (*DAMAGED_ARRAY, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:

@@ -26,7 +26,8 @@ from bootifol.demos.upright import TimedFrame
 from bootifol.demos.video_files import frame_rate, is_lerobot_dataset, stream_video
 from bootifol.envs.pictures import centered_square, resize
 from bootifol.errors import BootifolError
-from bootifol.files import written_aside
+from bootifol.files import remove_leftovers, written_aside
+from bootifol.locks import one_writer
 from bootifol.progress import progress
 from bootifol.types import Frame, Frames
 
@@ -35,6 +36,10 @@ Source = Path | LeRobotEpisode
 
 Crop = tuple[int, int, int]
 """A square of a picture: its left edge, its top edge and its side, in pixels."""
+
+LONGEST_STILL = 20_000
+"""Times that one picture of a file is taken in a row, at most: thirteen minutes at 25 a second. Damaged time stamps ask
+for any number."""
 
 LARGEST_SQUARE = "largest centered square"
 """How a manifest names the crop that nobody chose."""
@@ -63,15 +68,17 @@ class Conversion:
     def __post_init__(self) -> None:
         if self.frames < 2:
             raise BootifolError(f"a video needs at least 2 frames, not {self.frames}")
-        if self.size < 1:
-            raise BootifolError(f"pictures need a size of at least 1 pixel, not {self.size}")
+        if not 1 <= self.size <= 1024:
+            raise BootifolError(f"pictures need a size of at least 1 pixel and at most 1024, not {self.size}")
         if self.crop is not None and (min(self.crop[:2]) < 0 or self.crop[2] < 1):
             raise BootifolError(
                 "a crop is LEFT TOP SIDE in pixels, edges of at least 0 and a side of at least 1, not "
                 + " ".join(map(str, self.crop))
             )
-        if self.frames_per_second is not None and not self.frames_per_second > 0:
-            raise BootifolError(f"frames per second must be positive, not {self.frames_per_second}")
+        if self.frames_per_second is not None and not 0 < self.frames_per_second <= 1000:
+            raise BootifolError(
+                f"frames per second must be above 0 and at most 1000, not {self.frames_per_second}"
+            )
 
 
 def import_videos(
@@ -105,10 +112,14 @@ def import_videos(
         raise BootifolError("there are no videos to import: name files, or folders of pictures")
     name = name or f"{out.resolve().parent.name}-{behavior}"
     sources = _sources(files, camera)
-    with written_aside(out) as aside:
-        aside.mkdir()
-        _write_set(aside, sources, conversion, behavior, name)
-        write_contact_sheet(aside, DemoSet.open(aside))
+    with one_writer(out, out.parent / f".{out.name}.lock"):
+        remove_leftovers(out.parent, out)
+        if out.exists():
+            raise BootifolError(f"{out} exists by now: another process has imported videos there")
+        with written_aside(out) as aside:
+            aside.mkdir()
+            _write_set(aside, sources, conversion, behavior, name)
+            write_contact_sheet(aside, DemoSet.open(aside))
     return DemoSet.open(out)
 
 
@@ -215,6 +226,11 @@ def _resampled(source: Source, frames_per_second: float | None) -> Iterator[Fram
         seconds = _seconds(source, timed)
         if showing is not None:
             gap = seconds - since
+            if _instants_before(seconds, frames_per_second) - emitted > LONGEST_STILL:
+                raise BootifolError(
+                    f"{source} shows one picture for {gap:,.0f} s, {frames_per_second:g} times a second: its times "
+                    "are damaged, or the rate is too high; export it again, or import it without --fps"
+                )
             for _ in range(emitted, _instants_before(seconds, frames_per_second)):
                 yield showing
                 emitted += 1

@@ -10,6 +10,8 @@ Format: https://huggingface.co/docs/lerobot/lerobot-dataset-v3
 from __future__ import annotations
 
 import os
+import re
+import string
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -195,7 +197,7 @@ def _read_rows(dataset: Path, camera: str) -> list[_Row]:
     parquet = parquet_library()
     import pyarrow
 
-    files = sorted((dataset / EPISODES_DIRECTORY).glob("*/*.parquet"))
+    files = [file for file in sorted((dataset / EPISODES_DIRECTORY).glob("*/*.parquet")) if file.is_file()]
     if not files:
         raise BootifolError(
             f"{dataset / EPISODES_DIRECTORY} holds no parquet files, which say where each episode begins: copy or "
@@ -247,6 +249,8 @@ def _episode(dataset: Path, info: dict[str, Any], camera: str, rate: float, row:
 def _video_file(dataset: Path, info: dict[str, Any], **fields: str | int) -> Path:
     template = info.get("video_path")
     try:
+        if not _is_harmless(str(template)):
+            raise ValueError
         relative = os.path.normpath(str(template).format(**fields))
     except (ValueError, LookupError, AttributeError) as error:
         raise _damaged(dataset / INFO_PATH, "video_path", template) from error
@@ -255,6 +259,14 @@ def _video_file(dataset: Path, info: dict[str, Any], **fields: str | int) -> Pat
     if not isinstance(template, str) or unfit:
         raise _damaged(dataset / INFO_PATH, "video_path", template)
     return dataset / relative
+
+
+def _is_harmless(template: str) -> bool:
+    """Whether a template has plain fields, numbers no wider than `06d`: a width of 10^9 would be a text of as many."""
+    fields = [(name, spec) for _, name, spec, _ in string.Formatter().parse(template) if name is not None]
+    return len(template) <= 1000 and all(
+        name.isidentifier() and re.fullmatch(r"(0?\d?\d?d)?", spec or "") for name, spec in fields
+    )
 
 
 def _number(value: Any, file: Path, what: str) -> float:

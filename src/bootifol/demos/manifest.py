@@ -9,7 +9,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, shortened
 from bootifol.files import read_json, write_json
 
 FORMAT = 1
@@ -104,22 +104,22 @@ def installed_versions() -> dict[str, str]:
 
 def write_manifest(directory: Path, manifest: Manifest) -> None:
     """Writes `manifest.json` whole or not at all."""
-    write_json(directory / MANIFEST_NAME, {"format": FORMAT, **dataclasses.asdict(manifest)})
+    write_json(directory / MANIFEST_NAME, {"format": FORMAT, **dataclasses.asdict(manifest)}, sealed=True)
 
 
 def read_manifest(directory: Path) -> Manifest:
-    """Reads and checks `manifest.json`.
+    """Reads and checks `manifest.json`, but for its checksum, which `DemoSet.verify` compares.
 
     Raises:
         BootifolError: it is missing, no JSON, of another format, lacks a field, or contradicts itself.
     """
     path = directory / MANIFEST_NAME
-    value = read_json(path, "the demo set's manifest")
+    value = read_json(path, "the demo set's manifest", editable=True)
     if not isinstance(value, dict):
         raise BootifolError(f"{path} is not a demo set's manifest: it should be a JSON object")
     if value.get("format") != FORMAT:
         raise BootifolError(
-            f"{path} has format {value.get('format')!r} and this bootifol reads format {FORMAT}: "
+            f"{path} has format {shortened(value.get('format'))} and this bootifol reads format {FORMAT}: "
             "record the set again, or use the version that wrote it"
         )
     fields = _Fields(path, value)
@@ -181,7 +181,7 @@ def _check_consistent(path: Path, manifest: Manifest) -> None:
             )
     for shard in manifest.shards:
         if not re.fullmatch(r"shard-\d{5}\.npy", shard.file):
-            raise BootifolError(f"{path} names a file that is no shard of its own: {shard.file!r}")
+            raise BootifolError(f"{path} names a file that is no shard of its own: {shortened(shard.file)}")
     if len({video.name for video in manifest.videos}) != len(manifest.videos):
         raise BootifolError(f"{path} gives two videos the same name; record or import the set again")
 
@@ -205,7 +205,7 @@ class _Fields:
 
     def integer(self, key: str, least: int = 0) -> int:
         found = self.value.get(key)
-        if not isinstance(found, int) or isinstance(found, bool) or found < least:
+        if not isinstance(found, int) or isinstance(found, bool) or not least <= found < 2**63:
             raise self._wrong(key, f"a whole number of at least {least}")
         return found
 
@@ -216,7 +216,7 @@ class _Fields:
         found = self.value.get(key)
         if found is None:
             return None
-        if not isinstance(found, int | float) or isinstance(found, bool) or not found > 0:
+        if not isinstance(found, int | float) or isinstance(found, bool) or not 0 < found < 1e9:
             raise self._wrong(key, "a positive number")
         return float(found)
 
@@ -233,6 +233,6 @@ class _Fields:
 
     def _wrong(self, key: str, expected: str) -> BootifolError:
         return BootifolError(
-            f"{self.path} is damaged: {key!r} should be {expected} and is {self.value.get(key)!r}; "
+            f"{self.path} is damaged: {key!r} should be {expected} and is {shortened(self.value.get(key))}; "
             "record or import the set again"
         )

@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, get_args
@@ -40,10 +40,13 @@ from bootifol.demos.shards import (
 )
 from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.rollout import play_episode
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.errors import LARGEST_SEED, BootifolError, require_at_least, require_at_most
 from bootifol.experts import Behavior, make_behavior
+from bootifol.files import remove_leftovers
+from bootifol.locks import NAME as LOCK
+from bootifol.locks import one_writer
 from bootifol.progress import progress
-from bootifol.tasks import make_environment, task_named
+from bootifol.tasks import Task, make_environment, task_named
 from bootifol.types import Frames
 
 
@@ -67,6 +70,9 @@ class Recording:
         """
         return int(np.random.SeedSequence([self.seed, index]).generate_state(1)[0] >> 1)
 
+
+MOST_EPISODES = 10_000_000
+"""Of a recording: a manifest holds a line of each."""
 
 HALF_GOOD_VIDEOS = 64
 """Most half-good videos of one recording: they are for measuring, not for learning."""
@@ -154,7 +160,10 @@ def record(
         BootifolError: another set is there already, the disk is too small, or a name is unknown.
     """
     require_at_least(1, episodes=episodes, workers=workers)
+    require_at_most(MOST_EPISODES, episodes=episodes)
+    require_at_most(max(64, 4 * (os.cpu_count() or 1)), workers=workers)
     require_at_least(0, seed=seed)
+    require_at_most(LARGEST_SEED, seed=seed)
     if behavior not in get_args(Behavior):
         raise BootifolError(
             f"there is no behavior '{behavior}'; choose among {', '.join(get_args(Behavior))}"
@@ -166,6 +175,22 @@ def record(
             "the other behaviors with `--behaviors random`"
         )
     out = Path(out)
+    only_read = (out / MANIFEST_NAME).exists() and not os.access(out, os.W_OK)
+    with nullcontext() if only_read else one_writer(out):
+        remove_leftovers(out)
+        return _record(out, performed, behavior, episodes, pictures, seed, workers)
+
+
+def _record(
+    out: Path,
+    performed: Task,
+    behavior: Behavior,
+    episodes: int,
+    pictures: PictureConfig,
+    seed: int,
+    workers: int,
+) -> DemoSet:
+    task = performed.name
     plan = Recording(
         task, behavior, episodes, pictures, seed, performed.episode_steps, performed.action_repeat
     )
@@ -179,7 +204,7 @@ def record(
         done = sum(shard.videos for shard, _ in finished.values())
         with (
             progress(f"recording {manifest.name}", episodes, done) as advance,
-            _players(plan, workers) as play,
+            _players(plan, min(workers, episodes - done)) as play,
         ):
             for index in missing:
                 indices = range(index * per_shard, min((index + 1) * per_shard, episodes))
@@ -233,7 +258,7 @@ def _begin(out: Path, plan: Recording) -> Manifest:
         videos=(),
     )
     if not (out / MANIFEST_NAME).exists():
-        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        if out.exists() and (not out.is_dir() or any(path.name != LOCK for path in out.iterdir())):
             raise BootifolError(
                 f"{out} is there already and holds no demo set: choose another directory or remove it"
             )
@@ -249,8 +274,6 @@ def _begin(out: Path, plan: Recording) -> Manifest:
                 f"{out} holds another demo set (its {field.name} is {old!r}, not {wanted!r}): "
                 "choose another directory or remove it"
             )
-    for half_written in out.glob(".*.tmp"):  # left by a process that was killed
-        half_written.unlink()
     return there
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 import tokenize
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,17 +79,22 @@ class OpenShard:
     videos: int
     offset: int
     """Bytes before the first video."""
+    checksums: tuple[str, ...]
+    """Of each video's pixels, as the manifest has them."""
+    stamp: tuple[int, ...]
+    """Of the file when it was opened: while it is the same, nobody has written to it."""
 
     def read(self, row: int, frames: Frames) -> None:
         """Fills `frames`, uint8 `[T + 1, H, W, 3]` in one piece of memory, with video `row`.
 
         Raises:
-            BootifolError: the file is gone, or shorter than it was.
+            BootifolError: the file is gone, is shorter than it was, or was replaced by another.
         """
         try:
             with self.path.open("rb") as file:
                 file.seek(self.offset + row * frames.nbytes)
                 complete = file.readinto(frames.data) == frames.nbytes
+                changed = _stamp(os.fstat(file.fileno())) != self.stamp
         except OSError as error:
             raise BootifolError(
                 f"{self.path} cannot be read any more: {error}; restore it and run the command again"
@@ -97,17 +103,28 @@ class OpenShard:
             raise BootifolError(
                 f"{self.path} has become shorter while it was in use: restore it or record the set again"
             )
+        if changed and sha256_of_frames(frames) != self.checksums[row]:
+            raise BootifolError(
+                f"{self.path} was replaced or changed while it was in use: put back the videos that were learned from"
+            )
 
 
-def open_shard(directory: Path, shard: Shard, manifest: Manifest) -> OpenShard:
+def open_shard(directory: Path, shard: Shard, manifest: Manifest, first: int) -> OpenShard:
     """Makes the checks of a shard that cost nothing; only its header is read.
+
+    Args:
+        directory: of the demo set.
+        shard: see there.
+        manifest: of the set.
+        first: number of the shard's first video in it.
 
     Raises:
         BootifolError: the file is missing, has another size than the manifest says, or another shape or type.
     """
     path = directory / shard.file
     try:
-        size = path.stat().st_size
+        status = path.stat()
+        size = status.st_size
     except OSError:
         raise BootifolError(
             f"{path} is missing, and with it {shard.videos} videos: restore it or record the set again"
@@ -135,7 +152,13 @@ def open_shard(directory: Path, shard: Shard, manifest: Manifest) -> OpenShard:
             f"{path} is damaged: {size - offset:,} bytes follow its header, which promises "
             f"{math.prod(expected):,}; restore it or record the set again"
         )
-    return OpenShard(path, shard.videos, offset)
+    checksums = tuple(video.sha256 for video in manifest.videos[first : first + shard.videos])
+    return OpenShard(path, shard.videos, offset, checksums, _stamp(status))
+
+
+def _stamp(status: os.stat_result) -> tuple[int, ...]:
+    """What changes when a file is replaced or written to."""
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
 
 
 def _header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[np.generic]]:

@@ -16,7 +16,7 @@ from gymnasium.wrappers import TimeLimit
 from bootifol.envs.camera import prepare_opengl
 from bootifol.envs.pictures import PictureConfig, centered_square, is_picture, told_kind
 from bootifol.errors import BootifolError
-from bootifol.own_modules import is_own_name, own_callable, told, where
+from bootifol.own_modules import allow, is_own_name, own_callable, told, where
 from bootifol.types import Action, Frame
 
 PREFIX = "gymnasium:"
@@ -125,6 +125,7 @@ def make(name: str) -> Environment:
     """
     _prepare_rendering()
     if name.startswith(PREFIX):
+        allow(name)
         return _registered(name)
     return _made_by_function(name)
 
@@ -180,7 +181,7 @@ def _registered(name: str) -> Environment:
         if "render_mode" in str(error):
             raise _no_pictures(name, "its constructor takes no render_mode") from error
         raise BootifolError(f"{name} cannot be made: {told(error)}") from error
-    except Exception as error:  # an environment may do anything when it is made
+    except (Exception, SystemExit) as error:  # an environment may do anything when it is made
         raise BootifolError(f"{name} cannot be made: {told(error)}") from error
     return environment
 
@@ -194,7 +195,7 @@ def _made_by_function(name: str) -> Environment:
     function = own_callable(name, "function")
     try:
         made = function()
-    except Exception as error:  # a function may do anything
+    except (Exception, SystemExit) as error:  # a function may do anything
         raise BootifolError(f"{name} failed: {told(error)}{where(error)}") from error
     if not isinstance(made, gymnasium.Env):
         raise BootifolError(

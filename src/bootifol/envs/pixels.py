@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
 
 from bootifol.envs.pictures import FrameStack, PictureConfig, resize
+from bootifol.errors import BootifolError, EnvironmentFailed
+from bootifol.own_modules import told, where
 from bootifol.types import Action, Frame, Observation
 
 
@@ -78,7 +82,8 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Starts an episode; the same seed gives the same episode in any process."""
         super().reset(seed=seed)
-        self.simulator.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
+        with _own_errors("reset"):
+            self.simulator.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
         self._agent_steps, self._over = 0, False
         self._stack.start()
         info = self._look()
@@ -90,6 +95,7 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
         Raises:
             RuntimeError: the episode is over, or was never started.
             ValueError: the action has another shape than `[A]`, or is not finite.
+            EnvironmentFailed: the simulator raised an error.
         """
         if self._over:
             raise RuntimeError("the episode is over: call reset before step")
@@ -98,7 +104,8 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
         reward, terminated, cut, success = 0.0, False, False, None
         clipped = np.clip(action, -1.0, 1.0)
         for _ in range(self.action_repeat):
-            step_reward, terminated, success = self.simulator.step(clipped)
+            with _own_errors("step"):
+                step_reward, terminated, success = self.simulator.step(clipped)
             reward += step_reward
             cut = getattr(self.simulator, "truncated", False)
             if terminated or cut:
@@ -117,8 +124,22 @@ class PixelEnvironment(gymnasium.Env[Observation, Action]):
 
     def _look(self) -> dict[str, Any]:
         size = self.pictures.picture_size
-        picture = self.simulator.render() if self.rendered else np.zeros((size, size, 3), np.uint8)
+        with _own_errors("render"):
+            picture = self.simulator.render() if self.rendered else np.zeros((size, size, 3), np.uint8)
         return {
             "frame": resize(picture, self.pictures.agent_size),
             "video_frame": resize(picture, self.pictures.video_size),
         }
+
+
+@contextmanager
+def _own_errors(call: str) -> Iterator[None]:
+    """Tells a simulator's own errors, which may be any, in a sentence."""
+    try:
+        yield
+    except BootifolError as error:
+        raise EnvironmentFailed(str(error)) from error
+    except (Exception, SystemExit) as error:
+        raise EnvironmentFailed(
+            f"the environment failed in its {call}: {told(error)}{where(error)}; mend it"
+        ) from error

@@ -6,7 +6,7 @@ videos the reward model was not trained on.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +58,7 @@ class RankingScores:
 
 def rank_videos(
     model: RewardModel,
-    videos: Mapping[str, Sequence[Video]],
+    videos: Mapping[str, Iterable[Video]],
     expert: VideoSource,
     rng: np.random.Generator,
     agent_steps: int,

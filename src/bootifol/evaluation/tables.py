@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from bootifol.errors import BootifolError
-from bootifol.files import written_aside
+from bootifol.files import require_file, written_aside
 
 
 @dataclass(frozen=True)
@@ -160,6 +160,7 @@ def _read(path: Path, row_type: type[Row]) -> Table[Row]:
     columns = [field.name for field in fields(row_type)]
     readers = [_READERS[str(field.type)] for field in fields(row_type)]
     try:
+        require_file(path, "the table")
         lines = list(csv.reader(io.StringIO(path.read_text())))
     except FileNotFoundError:
         raise BootifolError(f"the table is missing: there is no {path}") from None
@@ -186,8 +187,14 @@ def _truth(text: str) -> bool:
     return text == "True"
 
 
+def _whole(text: str) -> int:
+    if len(text) > 18:
+        raise ValueError(f"a number of {len(text)} digits")
+    return int(text)
+
+
 _READERS: dict[str, Callable[[str], Any]] = {
-    "int": int,
+    "int": _whole,
     "float": float,
     "str": str,
     "float | None": lambda text: float(text) if text else None,

@@ -20,10 +20,11 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.errors import MOST_THREADS, BootifolError, require_at_least, require_at_most
 from bootifol.experts.policy import Layer, StatePolicy
 from bootifol.experts.states import StateEnvironment
-from bootifol.files import read_arrays, read_json, write_arrays, write_json, written_aside
+from bootifol.files import last_whole, read_arrays, read_json, write_arrays, write_json, written_aside
+from bootifol.locks import one_writer
 from bootifol.progress import progress
 from bootifol.tasks import task_named
 from bootifol.types import Arrays
@@ -80,6 +81,10 @@ class ExpertConfig:
             "threads",
         )
         require_at_least(1, **{f"experts {name}": getattr(self, name) for name in counts})
+        require_at_most(10**9, **{f"experts {name}": getattr(self, name) for name in counts})
+        require_at_most(MOST_THREADS, threads=self.threads)
+        require_at_least(0, seed=self.seed)
+        require_at_most(2**32 - 1, seed=self.seed)  # what stable-baselines3 takes
         if self.episode_steps is not None:
             require_at_least(1, **{"experts episode_steps": self.episode_steps})
 
@@ -98,9 +103,14 @@ def train_expert(config: ExpertConfig, out: Path, start_from: Path | None = None
     every evaluation), `checkpoint/` (with which the same call goes on).
 
     Raises:
-        BootifolError: stable-baselines3 is missing, `out` holds the training of another expert, or what is started from
-            does not fit.
+        BootifolError: stable-baselines3 is missing, `out` holds the training of another expert or one without its
+            checkpoint, another process writes there, or what is started from does not fit.
     """
+    with one_writer(out, out.parent / f".{out.name}.lock"):
+        return _train(config, out, start_from)
+
+
+def _train(config: ExpertConfig, out: Path, start_from: Path | None) -> StatePolicy:
     torch.set_num_threads(config.threads)
     if start_from is not None and not (out / "training.json").exists():
         _start_from(start_from, config, out)
@@ -112,8 +122,14 @@ def train_expert(config: ExpertConfig, out: Path, start_from: Path | None = None
     judged = StateEnvironment(config.task, steps)
     model = _make_model(config, environment)
     rows = _read_rows(out / "curve.csv")
-    if (out / "checkpoint").is_dir():
-        _load_checkpoint(out / "checkpoint", model)
+    checkpoint = last_whole(out / "checkpoint")
+    if checkpoint.is_dir():
+        _load_checkpoint(checkpoint, model)
+    elif rows:
+        raise BootifolError(
+            f"{out} has no checkpoint to go on from, and to begin anew would lose its curve.csv: copy its checkpoint/ "
+            "there, or choose another --out"
+        )
     rows = [row for row in rows if int(row["agent_steps"]) <= model.num_timesteps]
     best = max((float(row["mean_return"]) for row in rows), default=-np.inf)
     seconds = float(rows[-1]["seconds"]) if rows else 0.0

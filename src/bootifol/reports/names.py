@@ -30,8 +30,11 @@ def task_title(task: str) -> str:
 
 def hears_reward(run: RunFiles) -> bool:
     """Whether the reward has a say in what the policy becomes."""
-    weight = dict(flattened(run.config)).get("agent.cloning_weight", 0.0)
-    return float(weight) < CLONING_ALONE
+    try:
+        weight = float(dict(flattened(run.config)).get("agent.cloning_weight", 0.0))
+    except ValueError:  # somebody wrote no number
+        return True
+    return weight < CLONING_ALONE
 
 
 def agent_name(run: RunFiles) -> str:

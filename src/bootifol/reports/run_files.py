@@ -6,7 +6,6 @@ run in progress, a crash, a full disk); what could not be read is told in `RunFi
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,12 +18,14 @@ from numpy.typing import NDArray
 
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow, RankingRow, Row, Table, read_evaluations, read_ranking
-from bootifol.files import read_arrays, read_json
+from bootifol.files import parsed_json, read_arrays, read_json
 from bootifol.types import Arrays, Frames
 
 ALIGNMENT = "alignment"
 CLONING = "cloning"
 INTERACTIVE = "interactive"
+LARGEST_VIDEO = 50_000_000
+"""Bytes of an mp4 file above which a report does not hold it: a run's own have less than a hundredth."""
 COUNTERS = {ALIGNMENT: "gradient_step", CLONING: "gradient_step", INTERACTIVE: "agent_steps"}
 """The phases, and what each counts."""
 
@@ -176,7 +177,7 @@ def find_runs(paths: Sequence[Path]) -> list[Path]:
             raise BootifolError(
                 f"there is no directory {path}; give directories that `train` wrote, or one that holds them"
             )
-        below = _runs_below(path)
+        below = _runs_below(path, set())
         if not below and not any(_is_run(parent) for parent in path.resolve().parents):
             raise BootifolError(
                 f"there is no run in {path}; give directories that `train` wrote, or one that holds them"
@@ -190,12 +191,14 @@ def find_runs(paths: Sequence[Path]) -> list[Path]:
     return list(found.values())
 
 
-def _runs_below(path: Path) -> list[Path]:
+def _runs_below(path: Path, seen: set[Path]) -> list[Path]:
+    """Each directory is looked into once, for links may form circles."""
     if _is_run(path):
         return [path]
-    if not path.is_dir():
+    if not path.is_dir() or path.resolve() in seen:
         return []
-    return [run_dir for child in sorted(path.iterdir()) if child.is_dir() for run_dir in _runs_below(child)]
+    seen.add(path.resolve())
+    return [run_dir for child in sorted(path.iterdir()) for run_dir in _runs_below(child, seen)]
 
 
 def _is_run(path: Path) -> bool:
@@ -211,7 +214,7 @@ def read_run(run_dir: Path) -> RunFiles:
     if not run_dir.is_dir():
         raise BootifolError(f"there is no run directory {run_dir}; give the directory that `train` wrote")
     config_path = run_dir / "config.json"
-    header = read_json(config_path, f"the configuration of the run {run_dir}")
+    header = read_json(config_path, f"the configuration of the run {run_dir}", editable=True)
     if not isinstance(header, dict) or not isinstance(header.get("task"), str):
         raise BootifolError(
             f"{config_path} does not describe a run: it names no task; give the directory that `train` wrote"
@@ -222,16 +225,21 @@ def read_run(run_dir: Path) -> RunFiles:
     ranking = _read_table(run_dir / "ranking.csv", read_ranking, "ranking of held-out videos", notes)
     showcase = _read_showcase(run_dir / "showcase.safetensors", notes)
     video_files = _find_videos(run_dir / "videos", notes)
-    seconds = [*(last for _, last in phase_seconds.values()), *(row.seconds for row in evaluations)]
+    seconds = [
+        *(last for _, last in phase_seconds.values()),
+        *(row.seconds for row in evaluations if _is_finite(row.seconds)),
+    ]
     seed, time_budget = header.get("seed"), header.get("time_budget")
     return RunFiles(
         path=run_dir,
         task=header["task"],
         method=str(header.get("method", "unknown method")),
         preset=str(header.get("preset", "unknown preset")),
-        seed=seed if isinstance(seed, int) else None,
+        seed=seed if isinstance(seed, int) and not isinstance(seed, bool) else None,
         demos=_as_text(header.get("demos", "")),
-        time_budget=float(time_budget) if isinstance(time_budget, int | float) else None,
+        time_budget=float(time_budget)
+        if _is_finite(time_budget) and isinstance(time_budget, int | float)
+        else None,
         command=_as_text(header.get("command", "")),
         config=_as_mapping(header.get("config"), "config", notes),
         versions=_versions(header, notes),
@@ -285,7 +293,7 @@ def _versions(header: Mapping[str, Any], notes: list[str]) -> dict[str, str]:
     }
     resumed = header.get("resumed", [])
     for stage in resumed if isinstance(resumed, list) else []:
-        later = stage.get("versions", {}) if isinstance(stage, dict) else {}
+        later = _as_mapping(stage.get("versions", {}), "versions", notes) if isinstance(stage, dict) else {}
         for name, value in later.items():
             before = found.get(name, "unknown")
             if before.split(", then ")[-1] != str(value):
@@ -298,6 +306,8 @@ def _read_metrics(
 ) -> tuple[dict[tuple[str, str], Curve], dict[str, tuple[float, float]]]:
     """Curves by phase and name, and the first and last seconds of each phase."""
     try:
+        if not path.is_file():
+            raise FileNotFoundError
         lines = path.read_text(errors="replace").splitlines()
     except OSError:
         notes.append("metrics.jsonl is missing: no losses and no learned reward over time.")
@@ -341,16 +351,18 @@ def _read_metrics(
 def _parse_record(line: str) -> dict[str, Any] | None:
     """One line of metrics.jsonl; None where it is not a record with a phase and its counter."""
     try:
-        record = json.loads(line)
-    except json.JSONDecodeError:
+        record = parsed_json(line, constants=True)
+    except ValueError:
         return None
-    if not isinstance(record, dict) or record.get("phase") not in COUNTERS:
+    if not isinstance(record, dict) or not isinstance(record.get("phase"), str):
+        return None
+    if record["phase"] not in COUNTERS:
         return None
     return record if _is_finite(record.get(COUNTERS[record["phase"]])) else None
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
 
 
 def _read_table(path: Path, read: Callable[[Path], Table[Row]], what: str, notes: list[str]) -> list[Row]:
@@ -371,6 +383,9 @@ def _read_table(path: Path, read: Callable[[Path], Table[Row]], what: str, notes
 
 
 def _read_showcase(path: Path, notes: list[str]) -> dict[tuple[str, int], ShowcaseVideo]:
+    if path.exists() and _leaves(path.parent, path):
+        notes.append("showcase.safetensors was left out: it is a link that leaves the run.")
+        return {}
     if not path.exists():
         notes.append("showcase.safetensors is missing: no film strips and no reward along videos.")
         return {}
@@ -381,7 +396,7 @@ def _read_showcase(path: Path, notes: list[str]) -> dict[tuple[str, int], Showca
         return {}
     showcase: dict[tuple[str, int], ShowcaseVideo] = {}
     for name in sorted(arrays):
-        match = re.fullmatch(r"frames/([^/]+)/(\d+)", name)
+        match = re.fullmatch(r"frames/([^/]+)/(\d{1,9})", name)
         if match is None:
             continue
         kind, start = match.group(1), int(match.group(2))
@@ -399,7 +414,7 @@ def _showcase_video(arrays: Arrays, kind: str, start: int) -> ShowcaseVideo | No
     frames, rewards = arrays[f"frames/{kind}/{start}"], arrays.get(f"reward/{kind}/{start}")
     if frames.ndim != 4 or frames.shape[-1] != 3 or frames.dtype != np.uint8 or len(frames) < 2:
         return None
-    if rewards is None or rewards.shape != (len(frames) - 1,):
+    if rewards is None or rewards.shape != (len(frames) - 1,) or rewards.dtype.kind not in "iuf":
         return None
     returns = arrays.get(f"environment_return/{kind}/{start}")
     seeds = arrays.get(f"seed/{kind}/{start}")
@@ -408,24 +423,43 @@ def _showcase_video(arrays: Arrays, kind: str, start: int) -> ShowcaseVideo | No
         start=start,
         frames=frames.astype(np.uint8, copy=False),
         rewards=rewards.astype(np.float32),
-        environment_return=None if returns is None or returns.size != 1 else float(returns.ravel()[0]),
-        seed=None if seeds is None or seeds.size != 1 else int(seeds.ravel()[0]),
+        environment_return=_one_number(returns),
+        seed=None if (number := _one_number(seeds)) is None else int(number),
     )
+
+
+def _one_number(array: NDArray[np.generic] | None) -> float | None:
+    if array is None or array.size != 1 or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+        return None
+    return array.ravel()[0].item()  # type: ignore[no-any-return]
 
 
 def _find_videos(directory: Path, notes: list[str]) -> dict[tuple[str, int], Path]:
     found: dict[tuple[str, int], Path] = {}
     for path in sorted(directory.glob("*.mp4")):
-        match = re.fullmatch(r"(\w+)-(\d+)\.mp4", path.name)
+        match = re.fullmatch(r"(\w+)-(\d{1,9})\.mp4", path.name)
         if match is None:
             continue
-        if path.stat().st_size == 0:
+        if _leaves(directory.parent, path):
+            notes.append(f"videos/{path.name} was left out: it is a link that leaves the run.")
+        elif not path.is_file() or path.stat().st_size > LARGEST_VIDEO:
+            notes.append(f"videos/{path.name} was left out: it is no video of a run's.")
+        elif path.stat().st_size == 0:
             notes.append(f"videos/{path.name} is empty.")
         else:
             found[match.group(1), int(match.group(2))] = path
     if not found:
         notes.append("there are no videos to play.")
     return found
+
+
+def _leaves(run_dir: Path, path: Path) -> bool:
+    """Whether a path is a link that leads out of the run, or nowhere: a stranger would choose which of this machine's
+    files a report shows."""
+    try:
+        return not path.resolve(strict=True).is_relative_to(run_dir.resolve())
+    except (OSError, RuntimeError):  # the latter where links form a circle
+        return True
 
 
 def _count(number: int, noun: str) -> str:

@@ -34,7 +34,7 @@ def own_reward_model(name: str, video_size: int, seed: int, device: str) -> Rewa
         model = make(video_size, seed, device)
     except BootifolError:
         raise
-    except Exception as error:  # somebody's class may do anything
+    except (Exception, SystemExit) as error:  # somebody's class may do anything
         raise BootifolError(
             f"{name} failed when called with (video_size, seed, device): {told(error)}{where(error)}"
         ) from error

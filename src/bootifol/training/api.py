@@ -14,12 +14,19 @@ from bootifol.demos.import_videos import LARGEST_SQUARE, read_recordings
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.demos.video_writing import write_video
 from bootifol.envs.rollout import PlayedEpisode
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.errors import (
+    LARGEST_COUNT,
+    LARGEST_SEED,
+    BootifolError,
+    require_at_least,
+    require_at_most,
+)
 from bootifol.evaluation.returns import EpisodeResult, evaluation_rows, evaluation_seeds, scaled_return
 from bootifol.evaluation.returns import evaluate as evaluate_act
 from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import EvaluationRow
 from bootifol.files import written_aside
+from bootifol.output import output_may_fail
 from bootifol.presets import preset as preset_named
 from bootifol.progress import progress
 from bootifol.reports.html import report
@@ -34,7 +41,14 @@ from bootifol.training.components import (
     reference_rng,
 )
 from bootifol.training.config import TrainingConfig
+from bootifol.training.interruption import Stopped
 from bootifol.training.run_config import RunConfig
+from bootifol.training.run_directory import (
+    require_resumable,
+    require_same_videos,
+    require_unused,
+    writing_run,
+)
 from bootifol.training.saved_policy import require_checkpoint, restored_agent
 from bootifol.training.train import Run
 from bootifol.types import AnyPath, Rewards, Video
@@ -86,12 +100,7 @@ def train_policy(
     Raises:
         BootifolError: bad input, or an error that the run can be resumed from, which its sentence says.
     """
-    directory, console = Path(out), Console(stderr=True)
-    if (directory / "config.json").exists():
-        raise BootifolError(
-            f"{directory} holds a run already: go on with `bootifol train --resume {directory}`, or choose "
-            "another --out"
-        )
+    directory = Path(out)
     run = RunConfig(
         task=task,
         method=method,
@@ -101,19 +110,32 @@ def train_policy(
         time_budget=time_budget,
         training=config or preset_named(preset, method),
     )
-    learner = Run(run, directory, console)
-    run.write(directory, list(command))
-    return TrainedRun(directory, finished=_learn_and_report(learner))
+    with output_may_fail(), writing_run(directory):
+        require_unused(directory)
+        learner = Run(run, directory, _console())
+        run.write(directory, list(command))
+        return TrainedRun(directory, finished=_learn_and_report(learner))
 
 
-def continue_run(directory: AnyPath) -> bool:
+def continue_run(directory: AnyPath, trust: bool = False) -> bool:
     """Goes on with a run from its newest checkpoint, to its end, its final evaluation and its report.
+
+    Args:
+        directory: of the run.
+        trust: whether code that its `config.json` names (a task or a method `MODULE:NAME`) may be imported.
 
     Returns:
         False if it was asked to stop before its end.
+
+    Raises:
+        BootifolError: there is no run or no checkpoint, the videos are others than it began with, another process
+            writes to the run, or an error that the run can be resumed from.
     """
-    run = _run_with_demos(directory)
-    return _learn_and_report(Run(run, Path(directory), Console(stderr=True)))
+    directory = Path(directory)
+    run = _run_with_demos(directory, trust)
+    with output_may_fail(), writing_run(directory):
+        require_resumable(directory)
+        return _learn_and_report(Run(run, directory, _console()))
 
 
 @dataclass(frozen=True)
@@ -137,7 +159,11 @@ class RunEvaluation:
 
 
 def evaluate_run(
-    directory: AnyPath, episodes: int = 10, seed: int = 1000, videos: AnyPath | None = None
+    directory: AnyPath,
+    episodes: int = 10,
+    seed: int = 1000,
+    videos: AnyPath | None = None,
+    trust: bool = False,
 ) -> RunEvaluation:
     """Plays a run's newest policy, without exploration, in episodes of the task's evaluation length.
 
@@ -146,12 +172,15 @@ def evaluate_run(
         episodes: how many, at least one.
         seed: of the starts.
         videos: directory to write each episode to as `episode-<number from 0>.mp4`; None writes none.
+        trust: whether code that its `config.json` names (a task or a method `MODULE:NAME`) may be imported.
 
     Raises:
         BootifolError: there is no run, it has no checkpoint yet, or a file cannot be read or written.
     """
     require_at_least(0, seed=seed)
-    run = RunConfig.read(Path(directory))
+    require_at_most(LARGEST_SEED, seed=seed)
+    require_at_most(LARGEST_COUNT, episodes=episodes)
+    run = RunConfig.read(Path(directory), trust, needs_method=False)
     task = run.resolved_task()
     environment = build_environment(run, task.evaluation_steps)
     agent, saved = restored_agent(run, Path(directory), environment)
@@ -182,21 +211,24 @@ def evaluate_run(
     return RunEvaluation(results, summary, scaled_return(summary.mean, **levels), task.evaluation_steps, rows)
 
 
-def score_videos(directory: AnyPath, videos: Sequence[AnyPath]) -> dict[str, Rewards]:
+def score_videos(directory: AnyPath, videos: Sequence[AnyPath], trust: bool = False) -> dict[str, Rewards]:
     """The learned reward along videos, each compared with the same expert videos where the method compares.
 
     Args:
         directory: of the run.
         videos: video files, folders of frames, .npy files, LeRobot datasets or demo sets. Files are cut to a square and
             resampled to the expert videos' pictures per second, as an import does.
+        trust: whether code that its `config.json` names (a task or a method `MODULE:NAME`) may be imported.
 
     Returns:
         Rewards `[T]` by the video's name. A video longer than those it is compared with is scored as far as they reach.
     """
-    return {video.name: rewards for video, rewards in scored_videos(directory, videos)}
+    return {video.name: rewards for video, rewards in scored_videos(directory, videos, trust)}
 
 
-def scored_videos(directory: AnyPath, videos: Sequence[AnyPath]) -> Iterator[tuple[Video, Rewards]]:
+def scored_videos(
+    directory: AnyPath, videos: Sequence[AnyPath], trust: bool = False
+) -> Iterator[tuple[Video, Rewards]]:
     """The same one by one, with the pictures that were scored.
 
     Raises:
@@ -204,14 +236,14 @@ def scored_videos(directory: AnyPath, videos: Sequence[AnyPath]) -> Iterator[tup
     """
     if not videos:
         raise BootifolError("there are no videos to score: name files, folders of pictures, or demo sets")
-    run = _run_with_demos(directory)
+    run = _run_with_demos(directory, trust)
     model = build_reward_model(run)
     if model.reads_environment_reward:
         raise BootifolError(
             f"{directory} was trained on the environment's reward: it has no reward for videos"
         )
     load_checkpoint(require_checkpoint(Path(directory)), {"reward_model": model})
-    expert = open_demos(run, build_backbone(run), Console(stderr=True)).expert
+    expert = open_demos(run, build_backbone(run), _console()).expert
     references = draw_references(model, expert, reference_rng(run.seed, 0))
     length = min((len(reference.frames) for reference in references), default=None)
     for path in map(Path, videos):
@@ -229,25 +261,35 @@ def write_scores(path: Path, scores: dict[str, Rewards]) -> None:
             writer.writerows([name, step, f"{reward:.6g}"] for step, reward in enumerate(rewards))
 
 
-def _run_with_demos(directory: AnyPath) -> RunConfig:
+def _run_with_demos(directory: AnyPath, trust: bool) -> RunConfig:
     """A run's configuration, once its method and its videos are seen to be where it looks for them."""
-    run = RunConfig.read(Path(directory))
+    run = RunConfig.read(Path(directory), trust)
     check_method(run.method)
     if not Path(run.demos).is_dir():
         raise BootifolError(
             f"the videos that {directory} learns from are not at {run.demos}: give the command in the directory in "
             "which the run was started, or put them back"
         )
+    require_same_videos(Path(directory), run)
     return run
 
 
 def _learn_and_report(run: Run) -> bool:
     if not run.learn():
         return False
-    run.finish()
+    try:
+        run.finish()
+    except Stopped:
+        run.console.print(f"stopped before its last measurements. {run.how_to_resume()}")
+        return False
     target = report([run.directory], run.directory / "report.html")
     run.console.print(f"report: {target}")
     return True
+
+
+def _console() -> Console:
+    """Where messages go; what they hold, such as a path, is no markup."""
+    return Console(stderr=True, markup=False, emoji=False, soft_wrap=True)
 
 
 def read_videos(path: Path, run: RunConfig) -> Iterator[Video]:

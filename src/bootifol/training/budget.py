@@ -20,6 +20,10 @@ class Counters:
     agent_updates: int = 0
     reward_updates: int = 0
     evaluations: int = 0
+    to_evaluate: int = 0
+    """1 where an evaluation is due that the run was stopped before or in."""
+    to_rank: int = 0
+    """1 from the first step of alignment until held-out videos were ranked after its last."""
     cloning_phases: int = 0
     """Begun so far."""
     cloning_began_at: int = 0

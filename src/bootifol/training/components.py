@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.demos.features import FeaturizedVideos, without_pixels
 from bootifol.demos.manifest import read_manifest
 from bootifol.demos.record import record
+from bootifol.demos.verification import Verification
 from bootifol.devices import chosen_device
 from bootifol.envs.pixels import PixelEnvironment
 from bootifol.errors import BootifolError
@@ -49,6 +50,8 @@ class Demos:
     """Videos by kind that the reward never learns from, to see whether it ranks them right."""
     augmentation: AugmentationConfig | None = None
     """How videos vary in looks when the reward learns from them; None where they do not."""
+    verification: Verification = field(default_factory=Verification)
+    """Of the sets that were too large to be verified on opening."""
 
 
 @dataclass(frozen=True)
@@ -308,7 +311,8 @@ def open_demos(run: RunConfig, backbone: Backbone | None, console: Console) -> D
             )
             + f"import your own with `bootifol demos import YOUR_VIDEOS --out {root}`"
         )
-    expert = _open(paths["expert"], run)
+    unverified: list[DemoSet] = []
+    expert = _open(paths["expert"], run, unverified)
     if "random" not in paths:
         console.print("no random videos beside the expert's; recording as many")
     if "random" not in paths or not read_manifest(paths["random"]).complete:
@@ -330,7 +334,7 @@ def open_demos(run: RunConfig, backbone: Backbone | None, console: Console) -> D
     for kind in KINDS:
         if kind not in paths:
             continue
-        demo_set = expert if kind == "expert" else _open(paths[kind], run)
+        demo_set = expert if kind == "expert" else _open(paths[kind], run, unverified)
         training, aside = demo_set.split(min(held_out, len(demo_set) - 1))
         if backbone is None:
             sources[kind] = training
@@ -345,7 +349,13 @@ def open_demos(run: RunConfig, backbone: Backbone | None, console: Console) -> D
     augments = backbone is None and config.applies(imported=expert.manifest.conversion is not None)
     if augments:
         console.print("the reward learns from videos of varying looks (augmentation)")
-    return Demos(sources["expert"], sources["random"], kept if held_out else {}, config if augments else None)
+    return Demos(
+        sources["expert"],
+        sources["random"],
+        kept if held_out else {},
+        config if augments else None,
+        Verification(unverified),
+    )
 
 
 def reference_rng(seed: int, agent_steps: int) -> np.random.Generator:
@@ -353,9 +363,12 @@ def reference_rng(seed: int, agent_steps: int) -> np.random.Generator:
     return np.random.default_rng([seed, 2, agent_steps])
 
 
-def _open(path: Path, run: RunConfig) -> DemoSet:
-    shard_bytes = sum(file.stat().st_size for file in path.glob("*.npy"))
-    demo_set = DemoSet.open(path, verify=shard_bytes < _VERIFY_BELOW_BYTES)
+def _open(path: Path, run: RunConfig, unverified: list[DemoSet]) -> DemoSet:
+    demo_set = DemoSet.open(path)
+    if sum(shard.bytes for shard in demo_set.manifest.shards) < _VERIFY_BELOW_BYTES:
+        demo_set.verify()
+    else:
+        unverified.append(demo_set)
     found = differences(demo_set.manifest, run.resolved_task(), run.training.pictures)
     if found:
         raise BootifolError(f"the videos in {path} do not fit this run: {'; '.join(found)}")

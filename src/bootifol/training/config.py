@@ -8,7 +8,17 @@ from bootifol.agents.config import DrQv2Config
 from bootifol.demos.augmentation import AugmentationConfig
 from bootifol.devices import check_device_name
 from bootifol.envs.pictures import PictureConfig
-from bootifol.errors import BootifolError, fields_of, require_at_least, require_positive, require_share
+from bootifol.errors import (
+    LONGEST_EPISODE,
+    MOST_THREADS,
+    BootifolError,
+    fields_of,
+    require_at_least,
+    require_at_most,
+    require_positive,
+    require_reasonable,
+    require_share,
+)
 from bootifol.rewards.registry import RewardConfig
 from bootifol.training.demonstrations import DemonstrationConfig
 
@@ -159,4 +169,7 @@ class TrainingConfig:
         check_device_name(self.device)
         lengths = ("action_repeat", "episode_steps", "evaluation_steps")
         require_at_least(1, threads=self.threads, **fields_of("training", self, *lengths))
+        require_at_most(MOST_THREADS, threads=self.threads)
+        require_at_most(LONGEST_EPISODE, **fields_of("training", self, *lengths))
         require_positive(checkpoint_minutes=self.checkpoint_minutes)
+        require_reasonable("", self)

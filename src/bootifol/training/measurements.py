@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ from bootifol.evaluation.returns import evaluate, evaluation_rows, evaluation_se
 from bootifol.evaluation.showcase import play_showcase, write_showcase
 from bootifol.evaluation.sight import in_words, perform, sight
 from bootifol.evaluation.summary import summarize
-from bootifol.evaluation.tables import append_evaluations, append_ranking
+from bootifol.evaluation.tables import EvaluationRow, append_evaluations, append_ranking
 from bootifol.experts import make_expert, make_random
 from bootifol.progress import progress
 from bootifol.rewards.references import draw_references
@@ -44,6 +44,8 @@ class Measurements:
         counters: how far the run is.
         console: where sentences go.
         log: takes agent steps and metrics.
+        stop_if_requested: called wherever a measurement can be left off, which it then does by raising `Stopped`;
+            nothing of that measurement is written.
     """
 
     def __init__(
@@ -57,48 +59,58 @@ class Measurements:
         counters: Counters,
         console: Console,
         log: Callable[[int, Metrics], None],
+        stop_if_requested: Callable[[], None] = lambda: None,
     ) -> None:
         self._run, self._directory = run, directory
         self._task, self._config = run.resolved_task(), run.training.evaluation
         self._demos, self._environment, self._components = demos, environment, components
         self._budget, self._counters = budget, counters
         self._console, self._log = console, log
+        self._stop_if_requested = stop_if_requested
         self.newest: dict[str, float] = {}
         """Returns of the newest evaluation, by name."""
 
     def final_returns(self) -> Metrics:
         """Of the final evaluation, by name."""
         seeds = evaluation_seeds(self._run.seed, self._config.final_episodes)
-        return self._play(self._task.evaluation_steps, seeds, "final evaluation")
+        return self._keep(self._play(self._task.evaluation_steps, seeds, "final evaluation"))
 
     def returns_on_the_way(self) -> None:
-        """Of a few episodes of the training and of the evaluation length, from starts that no other evaluation has."""
+        """Of a few episodes of the training and of the evaluation length, from starts that no other evaluation has.
+
+        What is left off in the middle has left nothing, so that it can be done again.
+        """
         episodes = {self._task.episode_steps: self._config.episodes}
         # Where both lengths are one, it is evaluated once.
         same = episodes.get(self._task.evaluation_steps, 0)
         episodes[self._task.evaluation_steps] = max(same, self._config.long_episodes)
+        played = []
         for episode_steps, count in episodes.items():
             if count:
                 seeds = evaluation_seeds(self._run.seed, count, self._counters.agent_steps)
-                self._play(episode_steps, seeds)
+                played.append(self._play(episode_steps, seeds))
+        for rows in played:
+            self._keep(rows)
 
-    def _play(self, episode_steps: int, seeds: Sequence[int], description: str | None = None) -> Metrics:
-        """Plays episodes without noise and appends them to `evaluations.csv`."""
+    def _play(
+        self, episode_steps: int, seeds: Sequence[int], description: str | None = None
+    ) -> list[EvaluationRow]:
+        """Plays episodes without noise."""
         agent, counters = self._components.agent, self._counters
         environment = build_environment(self._run, episode_steps)
         steps = self._budget.scheduled_steps(counters)
 
-        def act(observation: Observation) -> Action:
-            return agent.act(observation, steps, explore=False)
-
-        if description is None:
-            results = evaluate(environment, act, seeds)
-        else:
-            with progress(description, len(seeds)) as advance:
-                results = evaluate(environment, act, seeds, watch=lambda _, __: advance(1))
-        environment.close()
+        act = self._until_stopped(lambda observation: agent.act(observation, steps, explore=False))
+        try:
+            if description is None:
+                results = evaluate(environment, act, seeds)
+            else:
+                with progress(description, len(seeds)) as advance:
+                    results = evaluate(environment, act, seeds, watch=lambda _, __: advance(1))
+        finally:
+            environment.close()
         at_evaluation_length = episode_steps == self._task.evaluation_steps
-        rows = evaluation_rows(
+        return evaluation_rows(
             results,
             agent_steps=counters.agent_steps,
             seconds=counters.seconds,
@@ -106,15 +118,29 @@ class Measurements:
             expert_return=self._task.expert_return if at_evaluation_length else None,
             random_return=self._task.random_return if at_evaluation_length else None,
         )
+
+    def _keep(self, rows: list[EvaluationRow]) -> Metrics:
+        """Appends episodes of one length to `evaluations.csv`, and logs their mean return."""
         append_evaluations(self._directory / "evaluations.csv", rows)
-        returns = summarize([result.environment_return for result in results])
-        name = f"evaluation/return_{episode_steps}"
-        metrics = {name: returns.mean}
-        if at_evaluation_length and rows[0].scaled_return is not None:
+        returns = summarize([row.environment_return for row in rows])
+        metrics = {f"evaluation/return_{rows[0].episode_steps}": returns.mean}
+        if rows[0].episode_steps == self._task.evaluation_steps and rows[0].scaled_return is not None:
             metrics["evaluation/scaled_return"] = float(np.mean([row.scaled_return for row in rows]))
-        self._log(counters.agent_steps, metrics)
+        self._log(self._counters.agent_steps, metrics)
         self.newest.update(metrics)
         return metrics
+
+    def _until_stopped(self, act: Act) -> Act:
+        def stoppable(observation: Observation) -> Action:
+            self._stop_if_requested()
+            return act(observation)
+
+        return stoppable
+
+    def _one_by_one(self, videos: Iterable[Video]) -> Iterator[Video]:
+        for video in videos:
+            self._stop_if_requested()
+            yield video
 
     def rank(self) -> None:
         """Appends the rewards of held-out videos, and of the agent's newest ones, to `ranking.csv`."""
@@ -128,7 +154,7 @@ class Measurements:
         sees = self._sight()
         rows = rank_videos(
             self._components.reward_model,
-            videos,
+            {kind: self._one_by_one(of_kind) for kind, of_kind in videos.items()},
             self._demos.expert,
             reference_rng(self._run.seed, self._counters.agent_steps),
             self._counters.agent_steps,
@@ -185,7 +211,7 @@ class Measurements:
             acts = {"expert": make_expert(self._run.task, self._environment), **acts}
         episodes = play_showcase(
             self._environment,
-            acts,
+            {who: self._until_stopped(act) for who, act in acts.items()},
             evaluation_seeds(self._run.seed, count),
             self._components.reward_model,
             self._demos.expert,

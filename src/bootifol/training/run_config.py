@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+import sys
 import types
 import typing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.checksums import is_as_written
+from bootifol.errors import (
+    LARGEST_COUNT,
+    LARGEST_SEED,
+    BootifolError,
+    require_at_least,
+    require_at_most,
+    shortened,
+)
 from bootifol.files import read_json, write_json
+from bootifol.own_modules import require_trust
 from bootifol.tasks import Task, task_named
 from bootifol.training.config import TrainingConfig
 from bootifol.training.provenance import versions, videos_in
@@ -35,6 +46,10 @@ class RunConfig:
 
     def __post_init__(self) -> None:
         require_at_least(0, seed=self.seed)
+        require_at_most(LARGEST_SEED, seed=self.seed)
+        if self.time_budget is not None:
+            require_at_least(0, time_budget=self.time_budget)
+            require_at_most(LARGEST_COUNT, time_budget=self.time_budget)
 
     def resolved_task(self) -> Task:
         """The task with the lengths that this run gives its episodes."""
@@ -58,36 +73,57 @@ class RunConfig:
                 "versions": versions(),
                 "videos": videos_in(Path(self.demos)),
             },
+            sealed=True,
         )
 
     @staticmethod
     def note_resumed(directory: Path, agent_steps: int) -> None:
         """Adds to `config.json` what goes on with the run, if it is not what it has been until now."""
         path = directory / "config.json"
-        data = read_json(path, "the run's configuration")
-        stages = data.get("resumed", [])
+        data = read_json(path, "the run's configuration", editable=True)
+        found = data.get("resumed", [])
+        stages = [stage for stage in found if isinstance(stage, dict)] if isinstance(found, list) else []
         if (stages[-1] if stages else data).get("versions") != (now := versions()):
             data["resumed"] = [*stages, {"agent_steps": agent_steps, "versions": now}]
-            write_json(path, data)
+            write_json(path, data, sealed=True)
+
+    @staticmethod
+    def videos_of(directory: Path) -> dict[str, Any]:
+        """Number and digest of the videos that a run began with, by who performs; empty for old runs."""
+        data = read_json(directory / "config.json", "the run's configuration", editable=True)
+        videos = data.get("videos") if isinstance(data, dict) else None
+        return {
+            behavior: {"count": told["count"], "digest": told["digest"]}
+            for behavior, told in (videos if isinstance(videos, dict) else {}).items()
+            if isinstance(told, dict) and told.keys() >= {"count", "digest"}
+        }
 
     @classmethod
-    def read(cls, directory: Path) -> RunConfig:
+    def read(cls, directory: Path, trust: bool = False, needs_method: bool = True) -> RunConfig:
         """Reads `config.json`.
 
+        Args:
+            directory: of the run.
+            trust: whether code that it names (a task or a method `MODULE:NAME`) may be imported.
+            needs_method: False for who acts and rewards nothing: the method is not imported then, unless the agent acts
+                on its encodings.
+
         Raises:
-            BootifolError: it is missing, damaged, or of another format.
+            BootifolError: it is missing, damaged, of another format, or names code that is not trusted.
         """
         path = directory / "config.json"
         if not path.is_file():
             raise BootifolError(f"{directory} is not a run: there is no {path}")
-        data = read_json(path, "the run's configuration")
+        data = read_json(path, "the run's configuration", editable=True)
+        if not is_as_written(path):
+            print(f"{path} was changed since bootifol wrote it, and is used as it is now", file=sys.stderr)
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise BootifolError(
                 f"{path} is not a configuration in format {FORMAT}; was it written by bootifol?"
             )
         hints = typing.get_type_hints(cls)
         try:
-            return cls(
+            run = cls(
                 **{
                     name: _checked(data[name], hints[name], name, path)
                     for name in hints
@@ -97,6 +133,10 @@ class RunConfig:
             )
         except KeyError as error:
             raise BootifolError(f"{path} lacks {error}; restore the file or start a new run") from error
+        require_trust(path, "task", run.task, trust)
+        if needs_method or run.training.agent.observations == "encodings":
+            require_trust(path, "method", run.method, trust)
+        return run
 
 
 def from_json(kind: type[_Config], data: Any, path: Path) -> _Config:
@@ -106,13 +146,15 @@ def from_json(kind: type[_Config], data: Any, path: Path) -> _Config:
         BootifolError: a field is unknown to this version, or its value is none that it can have.
     """
     if not isinstance(data, dict):
-        raise BootifolError(f"{path} is damaged: it has {data!r} in place of the fields of {kind.__name__}")
+        raise BootifolError(
+            f"{path} is damaged: it has {shortened(data)} in place of the fields of {kind.__name__}"
+        )
     hints = typing.get_type_hints(kind)
     unknown = sorted(set(data) - set(hints))
     if unknown:
         raise BootifolError(
-            f"{path} names {', '.join(unknown)}, which this version of bootifol does not know: go on with the version "
-            "that made the run, or start a new one"
+            f"{path} names {', '.join(unknown)[:300]}, which this version of bootifol does not know: go on with the "
+            "version that made the run, or start a new one"
         )
     values: dict[str, Any] = {}
     for name, value in data.items():
@@ -120,14 +162,17 @@ def from_json(kind: type[_Config], data: Any, path: Path) -> _Config:
             values[name] = from_json(typing.cast(type, hints[name]), value, path)
         else:
             values[name] = _checked(value, hints[name], name, path)
-    return kind(**values)
+    try:
+        return kind(**values)
+    except BootifolError as error:
+        raise BootifolError(f"{path}: {error}") from error
 
 
 def _checked(value: Any, kind: Any, name: str, path: Path) -> Any:
     """A field's value as JSON has it, if it is of the field's type; dataclasses check the rest."""
     if not _fits(value, kind):
         raise BootifolError(
-            f"{path} says that {name} is {value!r}, which it cannot be: correct or restore the file"
+            f"{path} says that {name} is {shortened(value)}, which it cannot be: correct or restore the file"
         )
     return value
 
@@ -136,7 +181,7 @@ def _fits(value: Any, kind: Any) -> bool:
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
         return any(_fits(value, choice) for choice in typing.get_args(kind))
     if typing.get_origin(kind) is typing.Literal:
-        return value in typing.get_args(kind)
+        return isinstance(value, str | int) and value in typing.get_args(kind)
     if kind in (int, float):
-        return isinstance(value, (int, kind)) and not isinstance(value, bool)
+        return isinstance(value, (int, kind)) and not isinstance(value, bool) and math.isfinite(value)
     return isinstance(value, kind)

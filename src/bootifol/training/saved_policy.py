@@ -17,7 +17,7 @@ from bootifol.types import AnyPath
 NAME = "policy.safetensors"
 
 
-def load_policy(run: AnyPath) -> Policy:
+def load_policy(run: AnyPath, trust: bool = False) -> Policy:
     """A run's newest policy, to act with outside of this library; it computes on the CPU.
 
     A run that acts on encodings has no `policy.safetensors` and is read from its newest checkpoint, which needs the
@@ -25,18 +25,20 @@ def load_policy(run: AnyPath) -> Policy:
 
     Args:
         run: the run's directory, or its `policy.safetensors` alone, wherever it was copied to.
+        trust: whether code that the run's `config.json` names may be imported; `policy.safetensors` needs none.
 
     Returns:
         A policy whose actions are bit for bit those of `evaluate` on the CPU.
 
     Raises:
-        BootifolError: there is no run, it has no checkpoint yet, or a file is damaged.
+        BootifolError: there is no run, it has no checkpoint yet, a file is damaged, or it names code that is not
+            trusted.
     """
     path = Path(run)
     file = path / NAME if path.is_dir() else path
     if file.is_file():
         return read_policy(file)
-    config = RunConfig.read(path)
+    config = RunConfig.read(path, trust, needs_method=False)
     config = replace(config, training=replace(config.training, device="cpu"))
     environment = build_environment(config, episode_steps=1)
     try:

@@ -6,6 +6,7 @@ What happens, in order, is `Run.learn` and `Run.finish`; what a phase does is in
 
 from __future__ import annotations
 
+import shlex
 import time
 from functools import partial
 from pathlib import Path
@@ -16,12 +17,13 @@ from rich.console import Console
 
 from bootifol.demos.augmentation import augmented
 from bootifol.devices import chosen_device
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, EnvironmentFailed
 from bootifol.evaluation.tables import drop_later_rows
 from bootifol.memory import keep_freed_memory
+from bootifol.own_modules import imports_code
 from bootifol.progress import progress
 from bootifol.rewards.registry import check_method
-from bootifol.tracking import Averages, Tracker
+from bootifol.tracking import Averages, Tracker, cut_metrics
 from bootifol.training.alignment import alignment_phase
 from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.checkpoint import (
@@ -34,7 +36,7 @@ from bootifol.training.checkpoint import (
 from bootifol.training.cloning import cloning_phase, steps_of_a_phase
 from bootifol.training.components import build_components, build_environment, build_learners, open_demos
 from bootifol.training.interactive import InteractivePhase
-from bootifol.training.interruption import Interruption
+from bootifol.training.interruption import Interruption, Stopped
 from bootifol.training.measurements import Measurements
 from bootifol.training.run_config import RunConfig
 from bootifol.training.saved_policy import save_policy
@@ -73,8 +75,9 @@ class Run:
         )
         self.counters = Counters()
         self.rng = np.random.default_rng([self.run.seed, 3])
+        self.interruption = Interruption()
         self._metrics_bytes = 0
-        self._resume()
+        checkpoint = self._resume()
         self.budget = Budget(
             config.interactive.agent_steps,
             self.run.time_budget,
@@ -96,7 +99,10 @@ class Run:
             rng=self.rng,
             featurizer=self.components.featurizer,
             augmentation=self.demos.augmentation,
+            stopping=lambda: self.interruption.requested,
         )
+        if checkpoint is not None and (checkpoint / "episode.safetensors").exists():
+            load_checkpoint(checkpoint, {"episode": self.interactive})
         self.measurements = Measurements(
             run=self.run,
             directory=self.directory,
@@ -107,6 +113,7 @@ class Run:
             counters=self.counters,
             console=self.console,
             log=partial(self._log, "interactive", "agent_steps"),
+            stop_if_requested=self.interruption.stop_if_requested,
         )
         self._saved_at = time.monotonic()
 
@@ -120,28 +127,56 @@ class Run:
         if newest_checkpoint(self.directory / "checkpoints") is not None:
             RunConfig.note_resumed(self.directory, self.counters.agent_steps)
         self.tracker = Tracker(self.directory, self.run.training.tensorboard)
-        with Interruption() as interruption:
+        with self.interruption as interruption:
             try:
+                if newest_checkpoint(self.directory / "checkpoints") is None:
+                    self._checkpoint()
                 return self._align(interruption) and self._interact(interruption)
+            except Stopped:
+                return self._stop()
+            except EnvironmentFailed as error:
+                self._checkpoint_unless(error)
+                raise BootifolError(f"{error}. {self.how_to_resume()}") from error
             except BootifolError as error:
-                raise BootifolError(f"{error}. {self._how_to_resume()}") from error
+                raise BootifolError(f"{error}. {self.how_to_resume()}") from error
 
     def finish(self) -> Metrics:
         """The measurements of a run that has ended: final returns, ranking, showcase.
 
         Returns:
             The final returns by name.
+
+        Raises:
+            Stopped: it was asked to stop, and goes on with these measurements when it is resumed.
         """
-        returns = self.measurements.final_returns()
-        self.measurements.rank()
-        self.measurements.showcase()
+        with self.interruption:
+            self.demos.verification.wait()
+            returns = self.measurements.final_returns()
+            self.measurements.rank()
+            self.measurements.showcase()
         self.tracker.close()
         return returns
 
+    def how_to_resume(self) -> str:
+        """The command that goes on with the run."""
+        if newest_checkpoint(self.directory / "checkpoints") is None:
+            return f"There is no checkpoint yet in {self.directory}: start again"
+        trust = " --trust" if imports_code(self.run.task) or imports_code(self.run.method) else ""
+        return f"Go on from the last checkpoint with: bootifol train --resume {shlex.quote(str(self.directory))}{trust}"
+
     def _align(self, interruption: Interruption) -> bool:
+        if not (self.budget.alignment_ended(self.counters) or self.counters.agent_steps):
+            self.counters.to_rank = 1
+            if not self._take_alignment_steps(interruption):
+                return False
+        if self.counters.to_rank:
+            self.measurements.rank()
+            self.counters.to_rank = 0
+            self._checkpoint()
+        return True
+
+    def _take_alignment_steps(self, interruption: Interruption) -> bool:
         config = self.run.training.alignment
-        if self.budget.alignment_ended(self.counters) or self.counters.agent_steps:
-            return True
         averages = Averages()
         model = self.components.reward_model
         shown: dict[str, float] = {}
@@ -166,8 +201,6 @@ class Run:
                 self._checkpoint_if_due()
         if not self.counters.alignment_steps:
             self.console.print("nothing to align: this method's reward learns nothing before the agent acts")
-        self.measurements.rank()
-        self._checkpoint()
         return True
 
     def _clone(self, interruption: Interruption) -> bool:
@@ -194,19 +227,27 @@ class Run:
                 if (done % log_every == 0 or done == total) and (means := averages.pop()):
                     self._log("cloning", "gradient_step", self.counters.cloning_gradient_steps, means)
                     shown |= means
+                self.counters.to_evaluate = int(done == total)
                 advance(1, **shown)
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()
         watch = Stopwatch()
-        self.measurements.returns_on_the_way()
+        self.counters.to_evaluate = 1
+        self._evaluate_if_due()
         self._checkpoint()
         self.counters.cloning_seconds += watch.lap()
         return True
 
+    def _evaluate_if_due(self) -> None:
+        if self.counters.to_evaluate:
+            self.measurements.returns_on_the_way()
+            self.counters.to_evaluate = 0
+
     def _interact(self, interruption: Interruption) -> bool:
         counters = self.counters
-        while not self.budget.ended(counters):
+        self._evaluate_if_due()
+        while self.interactive.in_progress or not self.budget.ended(counters):
             phase = self._clone if self.interactive.cloning_due else self._act_and_learn
             if not phase(interruption):
                 return False
@@ -224,16 +265,22 @@ class Run:
         self.interactive.start_clock()
         unit, done, total = self.budget.interactive_extent(counters)
         with progress("acting and learning", total, done, unit) as advance:
-            while not (self.budget.ended(counters) or self.interactive.cloning_due):
-                logged = counters.agent_steps // config.interactive.log_every
+            while self.interactive.in_progress or not (
+                self.budget.ended(counters) or self.interactive.cloning_due
+            ):
+                began = counters.agent_steps - self.interactive.steps_in_progress
+                logged = began // config.interactive.log_every
                 self.interactive.play_episode()
+                if self.interactive.in_progress:
+                    return self._stop()
                 if counters.agent_steps // config.interactive.log_every > logged:
                     self._log(
                         "interactive", "agent_steps", counters.agent_steps, self.interactive.averages.pop()
                     )
                 if counters.agent_steps // config.evaluation.every > counters.evaluations:
                     counters.evaluations = counters.agent_steps // config.evaluation.every
-                    self.measurements.returns_on_the_way()
+                    counters.to_evaluate = 1
+                    self._evaluate_if_due()
                 _, now, _ = self.budget.interactive_extent(counters)
                 advance(min(now, total) - done, **self._shown())
                 done = min(now, total)
@@ -250,10 +297,11 @@ class Run:
         short = {name.removeprefix("evaluation/"): value for name, value in self.measurements.newest.items()}
         return {"agent_steps": self.counters.agent_steps, **short}
 
-    def _resume(self) -> None:
+    def _resume(self) -> Path | None:
+        """Takes over the newest checkpoint, if there is one."""
         checkpoint = newest_checkpoint(self.directory / "checkpoints")
         if checkpoint is None:
-            return
+            return None
         saved = load_checkpoint(checkpoint, self.components.stateful())
         self.counters = saved.counters
         self.rng = restore_generator(saved.random_state)
@@ -262,16 +310,19 @@ class Run:
             f"resuming {self.directory} after {self.counters.alignment_steps:,} alignment steps and "
             f"{self.counters.agent_steps:,} agent steps"
         )
+        return checkpoint
 
     def _undo_what_followed_the_checkpoint(self) -> None:
         """Not on opening a run, for benchmarks open runs that are in progress."""
-        metrics = self.directory / "metrics.jsonl"
-        if metrics.exists():
-            with metrics.open("r+b") as file:
-                file.truncate(self._metrics_bytes)
+        missing = cut_metrics(self.directory / "metrics.jsonl", self._metrics_bytes)
+        if missing:
+            self.console.print(
+                f"metrics.jsonl lacks {missing:,} bytes of what was logged before the checkpoint"
+            )
         drop_later_rows(self.directory, self.counters.agent_steps)
 
     def _checkpoint_if_due(self) -> None:
+        self.demos.verification.check()
         if time.monotonic() - self._saved_at > 60 * self.run.training.checkpoint_minutes:
             self._checkpoint()
 
@@ -280,20 +331,25 @@ class Run:
         save_checkpoint(
             self.directory / "checkpoints",
             Progress(self.counters, dict(self.rng.bit_generator.state), self._metrics_bytes),
-            self.components.stateful(),
+            {
+                **self.components.stateful(),
+                **({"episode": self.interactive} if self.interactive.in_progress else {}),
+            },
         )
         save_policy(
             self.directory, self.run, self.environment, self.components.agent, self.counters.agent_steps
         )
         self._saved_at = time.monotonic()
 
+    def _checkpoint_unless(self, failed: BootifolError) -> None:
+        """Writes a checkpoint of what was learned before an environment failed; if that fails, too, both are told."""
+        try:
+            self._checkpoint()
+        except BootifolError as error:
+            raise BootifolError(f"{failed}; and {error}. {self.how_to_resume()}") from failed
+
     def _stop(self) -> bool:
         self._checkpoint()
         self.tracker.close()
-        self.console.print(f"stopped after a checkpoint. {self._how_to_resume()}")
+        self.console.print(f"stopped after a checkpoint. {self.how_to_resume()}")
         return False
-
-    def _how_to_resume(self) -> str:
-        if newest_checkpoint(self.directory / "checkpoints") is None:
-            return f"There is no checkpoint yet in {self.directory}: start again"
-        return f"Go on from the last checkpoint with: bootifol train --resume {self.directory}"
