@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import typing
+import warnings
+from pathlib import Path
 
 STOPPED = 130
 """Exit code of a command that was asked to stop before its end, as shells give it after Ctrl-C."""
@@ -14,6 +16,23 @@ class BootifolError(Exception):
 
     The command line prints it without a traceback and exits with code 2.
     """
+
+
+class BootifolWarning(UserWarning):
+    """What was taken one way where another was possible, or left out: a sentence, and the file it is about.
+
+    The command line prints it as a line that begins with `note:`.
+    """
+
+    def __init__(self, what: str, where: Path | None = None) -> None:
+        super().__init__(what if where is None else f"{where}: {what}")
+        self.what = what
+        self.where = where
+
+
+def warn(what: str, where: Path | None = None) -> None:
+    """Issues a `BootifolWarning`."""
+    warnings.warn(BootifolWarning(what, where), stacklevel=2)
 
 
 def fields_of(what: str, config: object, *names: str) -> dict[str, float]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -12,20 +11,24 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from bootifol.demos.kinds import kind_of, refuse_stand_in
+from bootifol.demos.litter import children
+from bootifol.demos.picture_order import in_order
 from bootifol.demos.shards import DAMAGED_ARRAY
 from bootifol.demos.upright import TimedFrame, upright_picture
 from bootifol.errors import BootifolError
 
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
-
 
 def stream_folder(path: Path) -> Iterator[TimedFrame]:
-    """Reads a folder of pictures as one video, in natural order of their names; errors are `BootifolError`."""
-    pictures = pictures_in(path)
+    """Reads a folder of pictures as one video, in the order of their names; errors are `BootifolError`."""
+    pictures = in_order(pictures_in(path))
     if not pictures:
-        raise BootifolError(f"{path} holds no pictures: a folder should hold one video as png or jpg files")
+        raise BootifolError(
+            f"{path} holds no pictures: a folder should hold one video as png, jpg, webp, bmp or tif files"
+        )
     size: tuple[int, int] | None = None
     for file in pictures:
+        refuse_stand_in(file)
         try:
             with Image.open(file) as picture:
                 frame = upright_picture(picture)
@@ -41,16 +44,8 @@ def stream_folder(path: Path) -> Iterator[TimedFrame]:
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """The pictures of a folder in natural order of their names."""
-    pictures = (file for file in folder.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES)
-    return sorted(pictures, key=natural_order)
-
-
-def natural_order(path: Path) -> list[tuple[int, str]]:
-    """A key for sorting: `frame2` comes before `frame10`."""
-    return [
-        (int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name.lower())
-    ]
+    """The still pictures of a folder."""
+    return [child for child in children(folder) if child.is_file() and kind_of(child) == "picture"]
 
 
 def stream_array(path: Path) -> Iterator[TimedFrame]:

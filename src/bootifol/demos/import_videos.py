@@ -36,6 +36,9 @@ Source = Path | LeRobotEpisode
 Crop = tuple[int, int, int]
 """A square of a picture: its left edge, its top edge and its side, in pixels."""
 
+_LONGEST_PICTURE = 3600.0
+"""Seconds; only damaged time stamps let one picture show for longer."""
+
 LARGEST_SQUARE = "largest centered square"
 """How a manifest names the crop that nobody chose."""
 
@@ -208,32 +211,53 @@ def _resampled(source: Source, frames_per_second: float | None) -> Iterator[Fram
     if frames_per_second is None:
         yield from (timed.frame for timed in _stream(source))
         return
-    showing: Frame | None = None
+    showing: TimedFrame | None = None
     since = gap = 0.0
     emitted = 0
     for timed in _stream(source):
         seconds = _seconds(source, timed)
         if showing is not None:
             gap = seconds - since
-            for _ in range(emitted, _instants_before(seconds, frames_per_second)):
-                yield showing
+            if gap < 0:
+                raise BootifolError(
+                    f"{source}: its times run backward at {since:.2f} s, so nobody can say which picture shows when: "
+                    "import it without --fps, which keeps every picture, or save it anew with another program"
+                )
+            for _ in range(emitted, _instants_before(source, seconds, gap, timed.tick, frames_per_second)):
+                yield showing.frame
                 emitted += 1
-        showing, since = timed.frame, seconds
-    if showing is not None:  # the last picture shows as long as the one before it did
-        for _ in range(emitted, max(1, _instants_before(since + gap, frames_per_second))):
-            yield showing
+        showing, since = timed, seconds
+    if showing is not None:
+        # Where the file does not say, the last picture shows as long as the one before it did.
+        lasts = gap if showing.lasts is None else showing.lasts
+        instants = _instants_before(source, since + lasts, lasts, showing.tick, frames_per_second)
+        for _ in range(emitted, max(1, instants)):
+            yield showing.frame
 
 
-def _instants_before(seconds: float, frames_per_second: float) -> int:
-    """How many of 0, 1/fps, 2/fps … lie before a time; half a millisecond absorbs rounded time stamps."""
-    return max(0, math.ceil((seconds - 0.0005) * frames_per_second))
+def _instants_before(source: Source, seconds: float, gap: float, tick: float, rate: float) -> int:
+    """How many of 0, 1/fps, 2/fps … lie before a time, up to what rounded time stamps are off by.
+
+    Args:
+        source: for the sentence.
+        seconds: the time.
+        gap: how long a picture has shown until then.
+        tick: what the file's times are off by.
+        rate: fps.
+    """
+    if gap > _LONGEST_PICTURE:
+        raise BootifolError(
+            f"{source}: one picture shows for {gap / 3600:.1f} hours; trim the file, or import it without --fps"
+        )
+    tolerance = min(max(tick, 0.0005), gap / 2)
+    return max(0, math.ceil((seconds - tolerance) * rate))
 
 
 def _seconds(source: Source, timed: TimedFrame) -> float:
     if timed.seconds is None:
         raise BootifolError(
-            f"{source} has no times to resample by (only video files do): import it without --fps, and with --frames "
-            "instead of --task"
+            f"{source} has no times to resample by (pictures, arrays and raw streams have none): import it without "
+            "--fps, and with --frames instead of --task"
         )
     return timed.seconds
 

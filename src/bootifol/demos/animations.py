@@ -1,0 +1,50 @@
+"""Picture files with several frames, as Pillow reads them: animated webp, png and avif, and stacks in one tiff."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from PIL import Image, ImageSequence
+
+from bootifol.demos.upright import TimedFrame, upright_picture
+from bootifol.errors import BootifolError
+
+_BROWSERS_SHORTEST = 11.0
+"""Milliseconds; browsers show a frame that asks for less for 100."""
+
+
+def stream_animation(path: Path) -> Iterator[TimedFrame]:
+    """Reads every frame with its time, or without where the file tells none.
+
+    Raises:
+        BootifolError: the file is damaged; at the latest at its end.
+    """
+    clock = 0.0
+    count = 0
+    size: tuple[int, ...] | None = None
+    try:
+        with Image.open(path) as picture:
+            frames = ImageSequence.Iterator(picture)
+            if getattr(picture, "default_image", False):
+                next(frames)  # for programs that show no animations
+            for frame in frames:
+                shown = upright_picture(frame.copy())
+                milliseconds = frame.info.get("duration")
+                lasts = _shown_for(milliseconds) if isinstance(milliseconds, int | float) else None
+                if size not in (None, shown.shape):
+                    raise BootifolError(
+                        f"{path} holds pictures of several sizes, so it is no video: save the frames alone"
+                    )
+                size = shown.shape
+                yield TimedFrame(shown, None if lasts is None else clock, lasts)
+                clock += lasts or 0.0
+                count += 1
+    except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError) as error:
+        raise BootifolError(
+            f"{path} is damaged or truncated: {count} pictures could be read ({error}); copy or export it again"
+        ) from error
+
+
+def _shown_for(milliseconds: float) -> float:
+    return (milliseconds if milliseconds >= _BROWSERS_SHORTEST else 100.0) / 1000.0

@@ -1,0 +1,77 @@
+"""Where a video file should end, by its own bytes: formats that play on without their last ones say so there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import BinaryIO, Literal
+
+
+def promised_bytes(path: Path) -> int:
+    """How long an avi, webm or mkv file says it is; 0 when it does not say."""
+    with path.open("rb") as file:
+        head = file.read(4096)
+    if head[:4] == b"RIFF":
+        riff = int.from_bytes(head[4:8], "little")
+        return 8 + riff if riff < 0xFFFFFFFF else 0
+    if head[:4] != b"\x1aE\xdf\xa3":
+        return 0
+    # EBML: an element is its name, its size as a number whose leading zero bits tell its length, and its contents.
+    header, header_bytes = _ebml_size(head, 4)
+    segment = header + (header_bytes or 0)
+    if head[segment : segment + 4] != b"\x18S\x80g":
+        return 0
+    start, size = _ebml_size(head, segment + 4)
+    return start + size if size is not None else 0
+
+
+def lacks_its_end(path: Path, kind: str) -> str:
+    """What is missing at the end of a gif or an Ogg file; "" for nothing.
+
+    Args:
+        path: the file.
+        kind: FFmpeg's name of its format.
+    """
+    with path.open("rb") as file:
+        size = file.seek(0, 2)
+        file.seek(max(0, size - 65536))
+        tail = file.read()
+    if kind == "gif" and not tail.rstrip(b"\0").endswith(b";"):
+        return "the mark at a gif's end is missing"
+    page = tail.rfind(b"OggS")
+    if kind == "ogg" and page >= 0 and not tail[page + 5] & 4:
+        return "its last page is not marked as the last"
+    return ""
+
+
+def fragments_end(path: Path) -> Literal["there", "missing"] | None:
+    """Whether an mp4 or mov file in fragments ends with the index of them; None for files in one piece."""
+    names = []
+    with path.open("rb") as file:
+        size = file.seek(0, 2)
+        place = 0
+        while place + 8 <= size and (box := _box(file, place)) is not None:
+            name, length = box
+            names.append(name)
+            place += length or size - place
+    if b"moof" not in names:
+        return None
+    return "there" if b"mfra" in names else "missing"
+
+
+def _box(file: BinaryIO, place: int) -> tuple[bytes, int] | None:
+    """Name and length of a box of ISO 14496-12, 0 for "to the end"; None for what is none."""
+    file.seek(place)
+    head = file.read(16)
+    length = int.from_bytes(head[:4], "big")
+    if length == 1:
+        length = int.from_bytes(head[8:16], "big")
+    return None if 0 < length < 8 else (head[4:8], length)
+
+
+def _ebml_size(head: bytes, place: int) -> tuple[int, int | None]:
+    """Where an element's contents begin, and their size; None when it was not known (a live recording)."""
+    length = 9 - head[place].bit_length() if place < len(head) else 9
+    if length > 8:
+        return place, None
+    unmarked = int.from_bytes(head[place : place + length], "big") - (1 << 7 * length)
+    return place + length, unmarked if unmarked != (1 << 7 * length) - 1 else None
