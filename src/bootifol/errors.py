@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import typing
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 STOPPED = 130
@@ -33,6 +35,21 @@ class BootifolWarning(UserWarning):
 def warn(what: str, where: Path | None = None) -> None:
     """Issues a `BootifolWarning`."""
     warnings.warn(BootifolWarning(what, where), stacklevel=2)
+
+
+@contextmanager
+def collected_warnings() -> Iterator[list[BootifolWarning]]:
+    """Yields a list that holds, after the block, every `BootifolWarning` of it; they are not shown."""
+    collected: list[BootifolWarning] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", BootifolWarning)
+        try:
+            yield collected
+        finally:
+            collected += [found.message for found in caught if isinstance(found.message, BootifolWarning)]
+    for found in caught:
+        if not isinstance(found.message, BootifolWarning):
+            warnings.warn_explicit(found.message, found.category, found.filename, found.lineno)
 
 
 def fields_of(what: str, config: object, *names: str) -> dict[str, float]:

@@ -76,8 +76,8 @@ def test_import_takes_a_folder_of_videos(tmp_path: Path, capsys: pytest.CaptureF
     assert [int(demo_set[i].frames[0, 0, 0, 0]) for i in range(3)] == [1, 2, 10]
     printed = capsys.readouterr().out
     assert "3 videos of 9 frames, 16×16 pixels, from 3 files" in printed
-    assert "3 shorter than 9 frames" in printed
-    assert "--out runs/TASK --pictures.video-size 16 --pictures.agent-size 16\n" in printed
+    assert "3 shorter than 9 frames: they stand still on their last picture; --frames 7 would" in printed
+    assert f"next: bootifol demos check {out}  (" in printed
     assert tyro.cli(demos.check, args=[str(out), "--task", "drawn_reach"]) == 1
     printed = capsys.readouterr().out
     assert "import them again with --frames 31" in printed

@@ -85,7 +85,7 @@ def import_(
     behavior: Literal["expert", "half_good", "random"] = "expert",
     camera: str | None = None,
 ) -> int:
-    """Make a demo set from your own videos: mp4, mov, webm, avi or gif files, folders of pictures, .npy arrays.
+    """Make a demo set from your own videos: mp4, mov, webm, avi, gif … files, folders of pictures, .npy arrays.
 
     A .npz archive may hold one such array among others. A LeRobot dataset of format v3 (its directory) gives one
     video an episode: its pictures alone, never its actions or states.
@@ -95,7 +95,7 @@ def import_(
     written down in OUT/BEHAVIOR/manifest.json, and OUT/BEHAVIOR/contact_sheet.png shows the result.
 
     Args:
-        videos: Files, and folders of them; a folder of pictures is one video.
+        videos: Files, and folders of them at any depth; a folder of pictures is one video.
         out: Directory of the demo sets, the one to give to `bootifol train --demos`.
         task: What the videos show; its environment says --fps and --frames, unless they are given.
         action_repeat: Simulator steps an agent step, with --task, if training shall have others than the task's own.
@@ -108,10 +108,9 @@ def import_(
         camera: Which camera of a LeRobot dataset to take, when it has several.
     """
     from bootifol.demos.import_videos import Conversion, import_videos
-    from bootifol.demos.video_files import video_paths
     from bootifol.tasks import frames_per_second, task_named
 
-    files = video_paths(videos)
+    lengths_of_task = task is not None and frames is None
     if task is not None:
         shown = task_named(task, action_repeat)
         frames = shown.episode_steps + 1 if frames is None else frames
@@ -125,18 +124,26 @@ def import_(
         frames_per_second=fps,
         windows=windows,
     )
-    demo_set = import_videos(files, out / behavior, conversion, behavior, camera=camera)
+    demo_set = import_videos(videos, out / behavior, conversion, behavior, camera=camera)
     manifest = demo_set.manifest
     short = sum(video.length < manifest.frames for video in manifest.videos)
     recordings = sum(video.source["first_frame"] == 0 for video in manifest.videos)
     what = "episode" if all("episode" in video.source for video in manifest.videos) else "file"
     print(f"{demo_set.path}: {_summary(manifest)}, from {_count(recordings, what)}")
     if short:
-        print(f"  {short} shorter than {manifest.frames} frames: they stand still on their last picture")
+        shortest = min(video.length for video in manifest.videos)
+        because = f", as long as an episode of {task}" if lengths_of_task else ""
+        print(
+            f"  {short} shorter than {manifest.frames} frames{because}: they stand still on their last picture; "
+            f"--frames {max(shortest, 2)} would leave none standing"
+        )
     print(f"  look at {demo_set.path / 'contact_sheet.png'}")
-    train = _train_words(task or "TASK", out, manifest)
+    if task is None:
+        print(f"next: bootifol demos check {out}  (bootifol tasks lists what --task can compare it with)")
+        return 0
+    train = _train_words(task, out, manifest)
     repeat = "" if action_repeat is None else f" --action-repeat {action_repeat}"
-    print(f"next: bootifol demos check {out} --task {task or 'TASK'}{repeat}, then bootifol {train}{repeat}")
+    print(f"next: bootifol demos check {out} --task {task}{repeat}, then bootifol {train}{repeat}")
     return 0
 
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import functools
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import tyro
 from rich.console import Console
 
 from bootifol.cli.help_texts import join_lines
-from bootifol.errors import STOPPED, BootifolError
+from bootifol.errors import STOPPED, BootifolError, BootifolWarning
 
 DESCRIPTION = """Videos in, policy out: learns a reward from videos of a task, and trains a pixel policy on it.
 
@@ -39,6 +41,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after bad input, which one sentence explains, or 130 after an interruption.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", BootifolWarning)
+        warnings.showwarning = functools.partial(_show_warning, warnings.showwarning)
+        return _exit_code(words)
+
+
+def _exit_code(words: list[str]) -> int:
     try:
         if words[:1] == ["demos"]:
             return _run(_demos_commands(), words[1:], "bootifol demos", DEMOS_DESCRIPTION)
@@ -56,6 +65,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of our output has gone, as `| head` does.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+def _show_warning(otherwise: Callable[..., None], message: Warning | str, *where: Any) -> None:
+    if isinstance(message, BootifolWarning):
+        Console(stderr=True, soft_wrap=True, emoji=False).print(f"[yellow]note:[/] {_escaped(str(message))}")
+    else:
+        otherwise(message, *where)
 
 
 def _run(commands: dict[str, Callable[..., int]], words: list[str], prog: str, description: str) -> int:

@@ -10,8 +10,8 @@ from PIL import Image, ImageSequence
 from bootifol.demos.upright import TimedFrame, upright_picture
 from bootifol.errors import BootifolError
 
-_BROWSERS_SHORTEST = 11.0
-"""Milliseconds; browsers show a frame that asks for less for 100."""
+_UNSAID = 0.1
+"""Seconds that a frame shows which says 0, as in a GIF."""
 
 
 def stream_animation(path: Path) -> Iterator[TimedFrame]:
@@ -31,7 +31,7 @@ def stream_animation(path: Path) -> Iterator[TimedFrame]:
             for frame in frames:
                 shown = upright_picture(frame.copy())
                 milliseconds = frame.info.get("duration")
-                lasts = _shown_for(milliseconds) if isinstance(milliseconds, int | float) else None
+                lasts = milliseconds / 1000 or _UNSAID if isinstance(milliseconds, int | float) else None
                 if size not in (None, shown.shape):
                     raise BootifolError(
                         f"{path} holds pictures of several sizes, so it is no video: save the frames alone"
@@ -44,7 +44,3 @@ def stream_animation(path: Path) -> Iterator[TimedFrame]:
         raise BootifolError(
             f"{path} is damaged or truncated: {count} pictures could be read ({error}); copy or export it again"
         ) from error
-
-
-def _shown_for(milliseconds: float) -> float:
-    return (milliseconds if milliseconds >= _BROWSERS_SHORTEST else 100.0) / 1000.0

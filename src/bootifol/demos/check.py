@@ -169,7 +169,7 @@ def find_defects(manifest: Manifest, looks: Sequence[Looks]) -> Defects:
         half_frozen=() if still or manifest.behavior == "half_good" else _named(entries, half_frozen),
         blank=_named(entries, [index for index, video in enumerate(looks) if video.blank]),
         cut=tuple(
-            f"{_name(entry)} at frame {video.cut}"
+            f"{entry.described} at frame {video.cut}"
             for entry, video in zip(entries, looks, strict=True)
             if video.cut is not None
         ),
@@ -187,17 +187,7 @@ def _look_at_all(demo_set: DemoSet) -> list[Looks]:
 
 
 def _named(entries: Sequence[VideoEntry], indices: Sequence[int]) -> tuple[str, ...]:
-    return tuple(_name(entries[index]) for index in indices)
-
-
-def _name(entry: VideoEntry) -> str:
-    """The video's name, and for imported ones where to find it."""
-    if "file" not in entry.source:
-        return entry.name
-    episode = f" episode {entry.source['episode']}" if "episode" in entry.source else ""
-    start = entry.source.get("first_frame")
-    window = f" from frame {start} on" if start else ""
-    return f"{entry.name} ({entry.source['file']}{episode}{window})"
+    return tuple(entries[index].described for index in indices)
 
 
 def differences(manifest: Manifest, task: Task, pictures: PictureConfig | None = None) -> list[str]:

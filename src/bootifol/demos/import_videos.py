@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from bootifol.demos.contact_sheet import write_contact_sheet
-from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.demo_set import DemoSet, listed
 from bootifol.demos.lerobot import LeRobotEpisode, lerobot_episodes
 from bootifol.demos.manifest import Manifest, Shard, VideoEntry, installed_versions, write_manifest
 from bootifol.demos.shards import (
@@ -23,9 +24,9 @@ from bootifol.demos.shards import (
     write_shard,
 )
 from bootifol.demos.upright import TimedFrame
-from bootifol.demos.video_files import frame_rate, is_lerobot_dataset, stream_video
+from bootifol.demos.video_files import frame_rate, is_lerobot_dataset, stream_video, video_paths
 from bootifol.envs.pictures import centered_square, resize
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, BootifolWarning, collected_warnings, warn
 from bootifol.files import written_aside
 from bootifol.progress import progress
 from bootifol.types import Frame, Frames
@@ -88,8 +89,8 @@ def import_videos(
     """Writes a demo set from video files; the set appears whole or not at all.
 
     Args:
-        files: video files, folders of pictures (each folder one video), .npy and .npz arrays, and LeRobot
-            datasets (each episode one video).
+        files: video files, folders of them or of the pictures of one video, .npy and .npz arrays, and LeRobot
+            datasets (each episode one video), as `video_paths` finds them.
         out: directory of the set; it must not exist.
         conversion: frame rate, length and size of the result.
         behavior: what the videos show.
@@ -98,7 +99,8 @@ def import_videos(
 
     Raises:
         BootifolError: `out` exists, files are empty, damaged or truncated (all such files are named), or the
-            camera is unclear.
+            camera is unclear. What was left out, or taken one way where another was possible, is a `BootifolWarning`,
+            and stands in the manifest beside the file.
     """
     conversion = conversion or Conversion()
     out = Path(out)
@@ -107,7 +109,7 @@ def import_videos(
     if not files:
         raise BootifolError("there are no videos to import: name files, or folders of pictures")
     name = name or f"{out.resolve().parent.name}-{behavior}"
-    sources = _sources(files, camera)
+    sources = _sources(video_paths(files), camera)
     with written_aside(out) as aside:
         aside.mkdir()
         _write_set(aside, sources, conversion, behavior, name)
@@ -137,9 +139,9 @@ def read_recordings(
     Raises:
         BootifolError: as `import_videos`.
     """
-    for source in _sources([path], camera if is_lerobot_dataset(path) else None):
+    for source in _sources(video_paths([path]), camera if is_lerobot_dataset(path) else None):
         rate = frames_per_second if _rate(source) else None
-        name = f"{path} episode {source.index}" if isinstance(source, LeRobotEpisode) else str(path)
+        name = f"{path} episode {source.index}" if isinstance(source, LeRobotEpisode) else str(source)
         for frames in convert(source, Conversion(sys.maxsize, size, crop, rate)):
             yield name, frames
 
@@ -249,7 +251,7 @@ def _instants_before(source: Source, seconds: float, gap: float, tick: float, ra
         raise BootifolError(
             f"{source}: one picture shows for {gap / 3600:.1f} hours; trim the file, or import it without --fps"
         )
-    tolerance = min(max(tick, 0.0005), gap / 2)
+    tolerance = min(max(tick, 0.0005), 0.4 * gap)
     return max(0, math.ceil((seconds - tolerance) * rate))
 
 
@@ -262,6 +264,15 @@ def _seconds(source: Source, timed: TimedFrame) -> float:
     return timed.seconds
 
 
+def _tell(notes: Sequence[BootifolWarning]) -> None:
+    """Says once what is true of many files."""
+    files: dict[str, list[str]] = defaultdict(list)
+    for note in notes:
+        files[note.what].append(str(note.where))
+    for what, where in files.items():
+        warn(f"{listed(where)}: {what}")
+
+
 def _write_set(
     directory: Path, sources: Sequence[Source], conversion: Conversion, behavior: str, name: str
 ) -> None:
@@ -271,26 +282,34 @@ def _write_set(
     entries: list[VideoEntry] = []
     waiting: list[Frames] = []
     problems: list[str] = []
+    notes: list[BootifolWarning] = []
     with progress("importing", total=len(sources)) as advance:
         for source in sources:
-            try:
-                for window, frames in enumerate(convert(source, conversion)):
-                    padded = last_frame_held(frames, conversion.frames)
-                    entries.append(
-                        VideoEntry(
-                            name=f"{name}-{len(entries):06d}",
-                            source=_described(source) | {"first_frame": window * conversion.frames},
-                            length=len(frames),
-                            sha256=sha256_of_frames(padded),
+            before = len(entries)
+            with collected_warnings() as told:
+                try:
+                    for window, frames in enumerate(convert(source, conversion)):
+                        padded = last_frame_held(frames, conversion.frames)
+                        entries.append(
+                            VideoEntry(
+                                name=f"{name}-{len(entries):06d}",
+                                source=_described(source) | {"first_frame": window * conversion.frames},
+                                length=len(frames),
+                                sha256=sha256_of_frames(padded),
+                            )
                         )
-                    )
-                    waiting.append(padded)
-                    if len(waiting) == per_shard:
-                        shards.append(write_shard(directory, len(shards), np.stack(waiting)))
-                        waiting = []
-            except BootifolError as error:
-                problems.append(str(error))
+                        waiting.append(padded)
+                        if len(waiting) == per_shard:
+                            shards.append(write_shard(directory, len(shards), np.stack(waiting)))
+                            waiting = []
+                except BootifolError as error:
+                    problems.append(str(error))
+            if told:
+                for entry in entries[before:]:
+                    entry.source["notes"] = [note.what for note in told]
+            notes += told
             advance(videos=str(len(entries)))
+    _tell(notes)
     if problems:
         raise BootifolError("\n".join(problems))
     if waiting:
