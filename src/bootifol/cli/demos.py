@@ -22,8 +22,9 @@ def record(
     video_size: int = 64,
     profile: Literal["fast", "balanced", "full"] = "fast",
     workers: int = 1,
+    policy: str | None = None,
 ) -> int:
-    """Record videos of a task's bundled expert, and of others for comparison.
+    """Record videos of a task's bundled expert, or of a policy of yours, and of others for comparison.
 
     Each behavior becomes a demo set of its own: OUT/expert, OUT/random (the method learns to tell it from the expert)
     and OUT/half_good (at most 64 videos, to see whether the learned reward ranks them between the two). Pictures only:
@@ -41,6 +42,8 @@ def record(
         video_size: Height and width of the videos, in pixels.
         profile: Render quality; training must use the same. fast costs a tenth of full.
         workers: Processes that record side by side; the videos are the same for any number.
+        policy: Who plays the expert in a Gymnasium environment: MODULE:FUNCTION, a function of yours that is called
+            with what the environment observes and returns an action of it.
     """
     # Imported here: the simulators would slow down every other command's help.
     from bootifol.demos.record import record_demos
@@ -51,7 +54,7 @@ def record(
     pictures = PictureConfig(agent_size=agent_size, video_size=video_size, profile=profile)
     try:
         recorded = record_demos(
-            task, out, episodes, behaviors, pictures, seed, episode_steps, workers, action_repeat
+            task, out, episodes, behaviors, pictures, seed, episode_steps, workers, action_repeat, policy
         )
         for behavior, demo_set in recorded.items():
             print(f"{out / behavior}: {_summary(demo_set.manifest)}")

@@ -64,12 +64,14 @@ class GymnasiumSimulator:
         space = _action_space(name, self.environment)
         _require_pictures(name, self.environment)
         self.action_dim = int(np.prod(space.shape))
-        self._shape, self._dtype = space.shape, space.dtype
+        self.action_shape, self._dtype = space.shape, space.dtype
         self._low, self._high = space.low.astype(np.float64), space.high.astype(np.float64)
         seconds = step_seconds(self.environment)
         self.knows_time = seconds is not None
         self.step_seconds = ASSUMED_STEP_SECONDS if seconds is None else seconds
         self.truncated = False
+        self.observation: Any = None
+        """What the environment itself observed last, for a policy of the user's; no learner reads it."""
         self._size = pictures.picture_size
         # What cannot be shown is refused here, before anyone has written a file.
         self.reset(seed=0)
@@ -78,16 +80,21 @@ class GymnasiumSimulator:
     def reset(self, seed: int) -> None:
         self.truncated = False
         with told_as_a_sentence(self.name, "reset()"), seeded(self.environment, seed):
-            self.environment.reset(seed=seed)
+            self.observation, _ = self.environment.reset(seed=seed)
 
     def step(self, action: Action) -> tuple[float, bool, bool | None]:
-        part = (np.asarray(action, np.float64).reshape(self._shape) + 1.0) / 2.0
+        part = (np.asarray(action, np.float64).reshape(self.action_shape) + 1.0) / 2.0
         scaled = (self._low + part * (self._high - self._low)).astype(self._dtype)
         with told_as_a_sentence(self.name, "step()"):
-            _, reward, terminated, truncated, info = self.environment.step(scaled)
+            self.observation, reward, terminated, truncated, info = self.environment.step(scaled)
         self.truncated = bool(truncated)
         number = one_number(self.name, "the reward", reward)
         return number, bool(terminated), success_of(self.name, info)
+
+    def in_unit_range(self, action: NDArray[np.float64]) -> Action:
+        """An action between the environment's own bounds as `step` takes it, float32 `[A]` in [-1, 1]."""
+        part = (action - self._low) / np.maximum(self._high - self._low, 1e-12)
+        return (2.0 * part - 1.0).clip(-1.0, 1.0).astype(np.float32).reshape(-1)
 
     def require_sights(self) -> None:
         """Looks whether anything is drawn, and whether starts follow from their seed, of which it warns.
