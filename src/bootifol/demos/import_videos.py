@@ -232,8 +232,12 @@ def _resampled(source: Source, frames_per_second: float | None) -> Iterator[Fram
     if showing is not None:
         # Where the file does not say, the last picture shows as long as the one before it did.
         lasts = gap if showing.lasts is None else showing.lasts
-        instants = _instants_before(source, since + lasts, lasts, showing.tick, frames_per_second)
-        for _ in range(emitted, max(1, instants)):
+        instants = max(1, _instants_before(source, since + lasts, lasts, showing.tick, frames_per_second))
+        # At a file's own rate a duration that is a tick too short must not lose the picture.
+        own_rate = showing.tick > 0 and lasts * frames_per_second > 0.75
+        if own_rate and emitted / frames_per_second < since + lasts + showing.tick:
+            instants = max(instants, emitted + 1)
+        for _ in range(emitted, instants):
             yield showing.frame
 
 
