@@ -40,7 +40,9 @@ def stream_animation(path: Path) -> Iterator[TimedFrame]:
                 yield TimedFrame(shown, None if lasts is None else clock, lasts)
                 clock += lasts or 0.0
                 count += 1
-    except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError) as error:
+    except BootifolError:
+        raise
+    except Exception as error:  # damaged ones make Pillow raise anything
         raise BootifolError(
             f"{path} is damaged or truncated: {count} pictures could be read ({error}); copy or export it again"
         ) from error

@@ -122,6 +122,11 @@ def chosen_track(path: Path, container: av.container.InputContainer, tell: bool 
         BootifolError: there is none.
     """
     tracks = [stream for stream in container.streams.video if not is_cover(stream)]
+    tracks = [track for track in tracks if track.codec_context is not None]
+    if not tracks and container.streams.video:
+        raise BootifolError(
+            f"{path} holds no pictures of a kind that is read (damaged, or of an unknown codec): export it as H.264"
+        )
     if not tracks:
         raise BootifolError(f"{path} holds no pictures (truncated, or sound only): give a whole video")
     chosen = max(tracks, key=lambda track: (bool(track.disposition & _DEFAULT), track.width * track.height))

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Literal
 
+_FIRST_BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot")
+
+_LONG_BOXES = (b"moov", b"mdat", b"moof", b"mfra")
+
 
 def promised_bytes(path: Path) -> int:
-    """How long an avi, webm or mkv file says it is; 0 when it does not say."""
+    """How long an avi, webm, mkv, mp4 or mov file says it is; 0 when it does not say."""
     with path.open("rb") as file:
         head = file.read(4096)
+        if head[4:8] in _FIRST_BOXES:
+            return max((end for name, _, end in _boxes(file) if name in _LONG_BOXES), default=0)
     if head[:4] == b"RIFF":
         riff = int.from_bytes(head[4:8], "little")
         return 8 + riff if riff < 0xFFFFFFFF else 0
@@ -45,17 +52,21 @@ def lacks_its_end(path: Path, kind: str) -> str:
 
 def fragments_end(path: Path) -> Literal["there", "missing"] | None:
     """Whether an mp4 or mov file in fragments ends with the index of them; None for files in one piece."""
-    names = []
     with path.open("rb") as file:
-        size = file.seek(0, 2)
-        place = 0
-        while place + 8 <= size and (box := _box(file, place)) is not None:
-            name, length = box
-            names.append(name)
-            place += length or size - place
+        names = [name for name, _, _ in _boxes(file)]
     if b"moof" not in names:
         return None
     return "there" if b"mfra" in names else "missing"
+
+
+def _boxes(file: BinaryIO) -> Iterator[tuple[bytes, int, int]]:
+    """Names, beginnings and ends of the outermost boxes of an mp4 or mov file."""
+    size = file.seek(0, 2)
+    place = 0
+    while place + 8 <= size and (box := _box(file, place)) is not None:
+        name, length = box
+        yield name, place, place + (length or size - place)
+        place += length or size - place
 
 
 def _box(file: BinaryIO, place: int) -> tuple[bytes, int] | None:

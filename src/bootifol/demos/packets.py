@@ -146,7 +146,8 @@ def _require_its_end(
                 f"{path} is truncated: its pictures end after {end:.2f} s of {seconds:.2f} s; copy or export it again"
             )
     by_marks = kind in ("gif", "ogg") or fragments == "there"
-    if not (indexed or by_marks or promised or (declares and fragments is None and container.duration)):
+    by_length = fragments is None and (promised > 0 or (declares and container.duration is not None))
+    if not (indexed or by_marks or by_length):
         warn("does not say how long it is: whether its end is missing cannot be told", path)
 
 
