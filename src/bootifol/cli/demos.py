@@ -1,4 +1,4 @@
-"""`bootifol demos record | import | check | export`: videos in and out."""
+"""`bootifol demos record | import | check | match | export`: videos in and out."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Literal
 
 from bootifol.cli.arguments import DemosPath, VideoPaths
 from bootifol.demos.manifest import Manifest
+from bootifol.demos.matching import Match
 from bootifol.errors import STOPPED, BootifolError
 
 
@@ -190,10 +191,82 @@ def check(
             print(f"  {difference}")
         if task is not None and not checked.differences:
             print(f"  fits the task {task}")
+        if task is not None and checked.looks_differ and manifest.task is None:
+            print(
+                f"  light, colors, place and background can be repaired: bootifol demos match {demos} --task {task}"
+            )
         shown = f" and {checked.first_frames}" if checked.first_frames is not None else ""
         print(f"  look at {checked.contact_sheet}{shown}")
         fits = fits and not checked.differences
     return 0 if fits else 1
+
+
+def match(
+    demos: DemosPath,
+    task: str,
+    out: Path | None = None,
+    repairs: tuple[Literal["crop", "colors", "exposure", "background"], ...] = (
+        "crop",
+        "colors",
+        "exposure",
+        "background",
+    ),
+    episode_steps: int | None = None,
+    action_repeat: int | None = None,
+) -> int:
+    """Bring imported videos toward the pictures of an environment, as a new directory of demo sets.
+
+    What `demos check` finds different is fitted on median pictures, in which what moves does not show, and taken back:
+    a square that shows what the environment shows; light and white balance; exposure that changes within a video; and
+    a background that is nearly the environment's. Only what brings the pictures nearer is done, and the manifest says
+    what. Recorded sets are copied.
+
+    Args:
+        demos: Directory of the demo sets, or one of them; it stays as it is.
+        task: Whose environment shows how the videos should look.
+        out: Directory to write; by default the name of DEMOS and _matched.
+        repairs: Which may be made.
+        episode_steps: Agent steps of an episode of the task, if training shall have others than the task's own.
+        action_repeat: Simulator steps an agent step, if training shall have others than the task's own.
+    """
+    from bootifol.demos.match_set import match_demo_sets
+    from bootifol.tasks import task_named
+
+    target = demos.with_name(f"{demos.resolve().name}_matched") if out is None else out
+    matched = match_demo_sets(demos, task_named(task, action_repeat, episode_steps), target, repairs)
+    for result in matched.values():
+        if result.match is None:
+            print(f"{result.path}: copied, for it was recorded in an environment")
+            continue
+        print(f"{result.path}: {_what_was_done(result.match)}")
+        print(
+            f"  the usual first picture differs from the environment's by {result.after:.1f} levels of 255 instead of "
+            f"{result.before:.1f}; look at {result.path / 'first_frames.png'}"
+        )
+        for sentence in result.remaining:
+            print(f"  {sentence}")
+    lengths = {"episode-steps": episode_steps, "action-repeat": action_repeat}
+    others = "".join(f" --{name} {value}" for name, value in lengths.items() if value is not None)
+    print(f"next: bootifol demos check {target} --task {task}{others}, then train with --demos {target}")
+    return 0
+
+
+def _what_was_done(match: Match) -> str:
+    done = []
+    if match.crop is not None:
+        left, top, side = match.crop
+        done.append(f"the square of {side} pixels at {left}, {top} was enlarged")
+    if (match.gain, match.offset) != ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0)):
+        gains, offsets = (
+            ", ".join(f"{value:{kind}}" for value in values)
+            for values, kind in ((match.gain, ".2f"), (match.offset, "+.0f"))
+        )
+        done.append(f"red, green and blue were multiplied by {gains} and moved by {offsets} levels")
+    if match.usual is not None:
+        done.append("each picture was exposed like the others")
+    if match.background is not None:
+        done.append("the background gave way to the environment's")
+    return "; ".join(done) or "nothing was to be done"
 
 
 def export(

@@ -27,7 +27,7 @@ A first tour, about three minutes without a simulator:
 `bootifol doctor` says what this machine can do, `bootifol tasks` what there is to learn.
 """
 
-DEMOS_DESCRIPTION = "Make, import, check and export sets of videos to learn from."
+DEMOS_DESCRIPTION = "Make, import, check, match and export sets of videos to learn from."
 EXPERTS_DESCRIPTION = "Train who performs a task in recordings, where none is bundled."
 
 
@@ -110,9 +110,9 @@ def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
 
 
 def _demos_commands() -> dict[str, Callable[..., int]]:
-    from bootifol.cli.demos import check, export, import_, record
+    from bootifol.cli.demos import check, export, import_, match, record
 
-    return {"record": record, "import": import_, "check": check, "export": export}
+    return {"record": record, "import": import_, "check": check, "match": match, "export": export}
 
 
 def _experts_commands() -> dict[str, Callable[..., int]]:
@@ -127,7 +127,7 @@ def _experts_placeholder() -> int:
 
 
 def _demos_placeholder() -> int:
-    """Make, import, check and export sets of videos: demos record, demos import, demos check, demos export."""
+    """Make, import, check, match and export sets of videos: demos record, import, check, match, export."""
     return main(["demos", "--help"])
 
 

@@ -101,6 +101,8 @@ class CheckedSet:
     defects: Defects
     differences: tuple[str, ...]
     """How the set differs from the task, each with what to do; empty without a task."""
+    looks_differ: bool
+    """Whether any of the differences is of light, color or place."""
     contact_sheet: Path
     first_frames: Path | None
     """First frames of videos and environment; None without a task, or when the videos show another one."""
@@ -121,17 +123,19 @@ def check_demo_set(path: Path, task: Task | None = None) -> CheckedSet:
     looks = _look_at_all(demo_set)
     found = differences(manifest, task) if task is not None else []
     picture = None
+    looks_of_videos: list[str] = []
     if task is not None and manifest.task in (None, task.name):
         videos = np.stack([video.first for video in looks])
         pictures = PictureConfig()
-        environment = first_frames(task, replace(pictures, **_shown_like(manifest, pictures)))
+        environment = first_frames(task, replace(pictures, **shown_like(manifest, pictures)))
         picture = write_first_frames(path, videos, environment)
-        found += differences_of_looks(videos, environment, path / FIRST_FRAMES_NAME)
+        looks_of_videos = differences_of_looks(videos, environment, path / FIRST_FRAMES_NAME)
     return CheckedSet(
         manifest=manifest,
         bytes_on_disk=sum(shard.bytes for shard in manifest.shards),
         defects=find_defects(manifest, looks),
-        differences=tuple(found),
+        differences=(*found, *looks_of_videos),
+        looks_differ=bool(looks_of_videos),
         contact_sheet=write_contact_sheet(path, demo_set),
         first_frames=picture,
     )
@@ -267,12 +271,12 @@ def picture_flags(manifest: Manifest, pictures: PictureConfig) -> str:
     """What a run with these pictures must be told to see the environment as the videos show it; "" for nothing."""
     return " ".join(
         f"--pictures.{name.replace('_', '-')} {value}"
-        for name, value in _shown_like(manifest, pictures).items()
+        for name, value in shown_like(manifest, pictures).items()
         if value != getattr(pictures, name)
     )
 
 
-def _shown_like(manifest: Manifest, pictures: PictureConfig) -> dict[str, Any]:
+def shown_like(manifest: Manifest, pictures: PictureConfig) -> dict[str, Any]:
     """The sizes and the profile of videos.
 
     Imported ones know no profile and no size for the agent: the run's own remain, but for an agent that would see more
