@@ -62,6 +62,7 @@ def test_ctrl_c_says_how_to_go_on(
     assert record(tmp_path / "demos") == 0
 
 
+@pytest.mark.filterwarnings("ignore::bootifol.errors.BootifolWarning")
 def test_import_takes_a_folder_of_videos(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "films"
     folder.mkdir()
