@@ -72,6 +72,8 @@ def test_answers_that_can_mean_one_thing_only_are_taken_so(
     ("function", "sentence"),
     [
         ("make_two_rewards", r"the reward has shape \[2\] where one number is wanted"),
+        ("make_no_reward", "the reward is None where one number is wanted"),
+        ("make_two_ends", r"terminated has shape \[2\] where one number is wanted"),
         ("make_worded_reward", "the reward is str where a number is wanted"),
         ("make_two_successes", r'info\["success"\] has shape \[2\]'),
         ("make_three_values", r"step\(\) returns 3 values where Gymnasium has 5"),

@@ -141,6 +141,7 @@ class Answering(Slide):
 
     def step(self, action: Any) -> Any:
         observation, reward, ended, cut, info = super().step(action)
+        ended = self.changed.get("ended", ended)
         answer = (observation, self.changed.get("reward", reward), ended, cut, self.changed.get("info", info))
         return answer[: self.changed.get("values", 5)]
 
@@ -200,6 +201,14 @@ def make_array_reward() -> gymnasium.Env[Any, Any]:
 
 def make_two_rewards() -> gymnasium.Env[Any, Any]:
     return Answering(reward=np.array([0.5, 1.0]))
+
+
+def make_no_reward() -> gymnasium.Env[Any, Any]:
+    return Answering(reward=None)
+
+
+def make_two_ends() -> gymnasium.Env[Any, Any]:
+    return Answering(ended=np.array([False, True]))
 
 
 def make_worded_reward() -> gymnasium.Env[Any, Any]:

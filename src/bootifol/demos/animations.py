@@ -10,6 +10,9 @@ from PIL import Image, ImageSequence
 from bootifol.demos.upright import TimedFrame, upright_picture
 from bootifol.errors import BootifolError
 
+_LONGEST_SIDE, _MOST_PIXELS = 2**14, 2**26
+"""Of a picture; larger ones are damaged headers."""
+
 _UNSAID = 0.1
 """Seconds that a frame shows which says 0, as in a GIF."""
 
@@ -25,6 +28,11 @@ def stream_animation(path: Path) -> Iterator[TimedFrame]:
     size: tuple[int, ...] | None = None
     try:
         with Image.open(path) as picture:
+            if max(picture.size) > _LONGEST_SIDE or picture.width * picture.height > _MOST_PIXELS:
+                raise BootifolError(
+                    f"{path} says that its pictures have {picture.width}×{picture.height} pixels: it is damaged, or "
+                    "too large for a video"
+                )
             frames = ImageSequence.Iterator(picture)
             if getattr(picture, "default_image", False):
                 next(frames)  # for programs that show no animations

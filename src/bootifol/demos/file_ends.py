@@ -38,16 +38,43 @@ def lacks_its_end(path: Path, kind: str) -> str:
         path: the file.
         kind: FFmpeg's name of its format.
     """
+    if kind == "gif":
+        return "" if gif_is_whole(path) else "the mark at a gif's end is missing"
     with path.open("rb") as file:
         size = file.seek(0, 2)
         file.seek(max(0, size - 65536))
         tail = file.read()
-    if kind == "gif" and not tail.rstrip(b"\0").endswith(b";"):
-        return "the mark at a gif's end is missing"
     page = tail.rfind(b"OggS")
     if kind == "ogg" and page >= 0 and not tail[page + 5] & 4:
         return "its last page is not marked as the last"
     return ""
+
+
+def gif_is_whole(path: Path) -> bool:
+    """Whether the blocks of a gif lead to the mark at its end."""
+    data = path.read_bytes()
+    try:
+        place = 13 + _colors(data[10])
+        while data[place] != ord(";"):
+            if data[place] == ord("!"):  # an extension: its kind, then blocks
+                place += 2
+            elif data[place] == ord(
+                ","
+            ):  # a picture: where it lies, perhaps colors, the size of a code, then blocks
+                place += 11 + _colors(data[place + 9])
+            else:
+                return False
+            while data[place]:
+                place += 1 + data[place]
+            place += 1
+    except IndexError:
+        return False
+    return True
+
+
+def _colors(flags: int) -> int:
+    """Bytes of a gif's table of colors."""
+    return 3 << (flags & 7) + 1 if flags & 128 else 0
 
 
 def fragments_end(path: Path) -> Literal["there", "missing"] | None:

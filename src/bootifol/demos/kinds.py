@@ -9,6 +9,7 @@ import av
 from av.stream import Disposition
 from PIL import Image
 
+from bootifol.demos.file_ends import gif_is_whole
 from bootifol.errors import BootifolError
 
 Kind = Literal["array", "archive", "video", "animation", "picture", "other"]
@@ -139,7 +140,7 @@ def _is_one_picture(path: Path) -> bool:
     """Whether a GIF surely is a still picture; a damaged one is left to the decoder, which says what is wrong."""
     try:
         with Image.open(path) as picture:
-            return getattr(picture, "n_frames", 2) == 1 and path.read_bytes().rstrip(b"\0").endswith(b";")
+            return getattr(picture, "n_frames", 2) == 1 and gif_is_whole(path)
     except Exception:  # as above
         return False
 

@@ -87,9 +87,9 @@ class GymnasiumSimulator:
         scaled = (self._low + part * (self._high - self._low)).astype(self._dtype)
         with told_as_a_sentence(self.name, "step()"):
             self.observation, reward, terminated, truncated, info = self.environment.step(scaled)
-        self.truncated = bool(truncated)
-        number = one_number(self.name, "the reward", reward)
-        return number, bool(terminated), success_of(self.name, info)
+        self.truncated = bool(one_number(self.name, "truncated", truncated))
+        ended = bool(one_number(self.name, "terminated", terminated))
+        return one_number(self.name, "the reward", reward), ended, success_of(self.name, info)
 
     def in_unit_range(self, action: NDArray[np.float64]) -> Action:
         """An action between the environment's own bounds as `step` takes it, float32 `[A]` in [-1, 1]."""

@@ -115,12 +115,14 @@ def one_number(name: str, what: str, value: Any) -> float:
         BootifolError: it is none, or there are several.
     """
     try:
-        numbers = np.asarray(value, dtype=np.float64)
+        # None would become NaN.
+        numbers = np.asarray([] if value is None else value, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise BootifolError(f"{name}: {what} is {type(value).__name__} where a number is wanted") from error
     if numbers.size != 1:
+        found = "is None" if value is None else f"has shape {list(numbers.shape)}"
         raise BootifolError(
-            f"{name}: {what} has shape {list(numbers.shape)} where one number is wanted: is it several environments in "
+            f"{name}: {what} {found} where one number is wanted: is it several environments in "
             "one? Make a single one"
         )
     return float(numbers.reshape(()))
