@@ -24,7 +24,7 @@ def _suffixes(listed: str) -> frozenset[str]:
 VIDEO_SUFFIXES = _suffixes(
     ".mp4 .m4v .mov .qt .3gp .3g2 .f4v .mj2 .mkv .webm .avi .divx .gif .ts .mts .m2ts .m2t .mpg .mpeg .mpe "
     ".vob .m2v .m1v .mpv .flv .wmv .asf .ogv .ogm .mxf .nut .ivf .y4m .mjpg .mjpeg .h264 .264 .avc .h265 "
-    ".265 .hevc .obu .dv .rm .rmvb .wtv .gxf .amv"
+    ".265 .hevc .obu .dv .rm .rmvb .wtv .gxf .swf .amv"
 )
 """Suffixes that promise a video: such a file is read or refused, never left out."""
 
@@ -50,7 +50,7 @@ _MAYBE_ANIMATED = frozenset((".png", ".apng", ".webp", ".avif", ".tif", ".tiff")
 
 CONTAINERS = (
     "mov,mp4,m4a,3gp,3g2,mj2 matroska,webm avi gif mpegts mpeg flv asf ogg mxf nut ivf "
-    "yuv4mpegpipe dv rm wtv gxf"
+    "yuv4mpegpipe dv rm wtv gxf swf"
 )
 """FFmpeg's names of formats that hold videos and say so; it also plays text files and lists of other files."""
 
