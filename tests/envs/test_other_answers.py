@@ -105,7 +105,9 @@ def test_without_a_display_sdl_draws_offscreen(monkeypatch: pytest.MonkeyPatch) 
         simulator("make_blank_if_dummy").require_sights()
 
 
-@pytest.mark.parametrize("function", ["make_ignoring_numpy", "make_ignoring_python", "make_ignoring_before"])
+@pytest.mark.parametrize(
+    "function", ["make_ignoring_numpy", "make_ignoring_python", "make_ignoring_before", "make_private"]
+)
 def test_starts_follow_from_the_seed_wherever_they_are_drawn(function: str) -> None:
     made = simulator(function)
     with warnings.catch_warnings():

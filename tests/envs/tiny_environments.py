@@ -165,6 +165,17 @@ class SeedIgnored(Slide):
         return {"place": np.float32([self.place])}, {}
 
 
+class Private(Slide):
+    """Keeps its generator to itself, and `reset` knows no info."""
+
+    np_random = property(lambda self: self._generator)  # type: ignore[assignment]
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+        self._generator = np.random.default_rng(seed)
+        self.place, self.steps = float(self._generator.uniform(-0.9, 0.5)), 0
+        return {"place": np.float32([self.place])}, None
+
+
 class Blank(Slide):
     """Draws nothing before a step, or nothing with SDL's dummy driver, as highway-env."""
 
@@ -271,3 +282,7 @@ def make_blank_at_first() -> gymnasium.Env[Any, Any]:
 
 def make_blank_if_dummy() -> gymnasium.Env[Any, Any]:
     return Blank()
+
+
+def make_private() -> gymnasium.Env[Any, Any]:
+    return Private("rgb_array")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import random
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import gymnasium
@@ -44,8 +44,8 @@ class TodaysAnswers(gymnasium.Wrapper[Any, Any, Any, Any]):
         if "seed" not in words and seed is not None and callable(seed_it):
             seed_it(seed)
         answer = self.env.reset(**words)
-        if isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[1], Mapping):
-            return answer[0], dict(answer[1])
+        if isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[1], Mapping | None):
+            return answer[0], dict(answer[1] or {})
         return answer, {}
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -82,7 +82,8 @@ def seeded(environment: Environment, seed: int) -> Iterator[None]:
 
     Some draw before they seed, or from numpy's and Python's own generators, which are put back afterwards.
     """
-    environment.unwrapped.np_random = np.random.default_rng(seed)
+    with suppress(AttributeError, TypeError):  # some keep theirs to themselves
+        environment.unwrapped.np_random = np.random.default_rng(seed)
     numpys, pythons = np.random.get_state(), random.getstate()
     np.random.seed(seed % 2**32)
     random.seed(seed)
