@@ -140,7 +140,10 @@ def test_matched_sets_stand_beside_and_say_what_was_done(
     assert main(["demos", "match", str(imported), "--task", "drawn_home"]) == 0
     out = imported.with_name("demos_matched")
     printed = capsys.readouterr().out
-    assert f"next: bootifol demos check {out} --task drawn_home" in printed
+    assert (
+        f"next: bootifol demos check {out} --task drawn_home, then bootifol train --task drawn_home"
+        in printed
+    )
     assert "random: copied, for it was recorded" in printed
     assert (imported / "expert" / "manifest.json").read_bytes() == before
     matched, source = DemoSet.open(out / "expert", verify=True), DemoSet.open(imported / "expert")

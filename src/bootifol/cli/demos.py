@@ -229,6 +229,7 @@ def match(
         episode_steps: Agent steps of an episode of the task, if training shall have others than the task's own.
         action_repeat: Simulator steps an agent step, if training shall have others than the task's own.
     """
+    from bootifol.demos.manifest import read_manifest
     from bootifol.demos.match_set import match_demo_sets
     from bootifol.tasks import task_named
 
@@ -247,7 +248,8 @@ def match(
             print(f"  {sentence}")
     lengths = {"episode-steps": episode_steps, "action-repeat": action_repeat}
     others = "".join(f" --{name} {value}" for name, value in lengths.items() if value is not None)
-    print(f"next: bootifol demos check {target} --task {task}{others}, then train with --demos {target}")
+    train = _train_words(task, target, read_manifest(next(iter(matched.values())).path))
+    print(f"next: bootifol demos check {target} --task {task}{others}, then bootifol {train}{others}")
     return 0
 
 
