@@ -90,9 +90,19 @@ def test_what_systems_leave_everywhere_is_no_matter(tmp_path: Path, video: bytes
     assert found(tmp_path / "videos") == (["a.mp4"], "")
     assert found(tmp_path / "pictures") == (["."], "")
     assert numbers(tmp_path / "pictures") == [0, 0]
-    note = tmp_path / "videos" / "._a.mp4"
-    with pytest.warns(BootifolWarning, match="notes of macOS"):
-        assert video_paths([tmp_path / "videos" / "a.mp4", note]) == [tmp_path / "videos" / "a.mp4"]
+
+
+def test_files_named_by_an_asterisk_are_as_those_of_the_folder(tmp_path: Path, video: bytes) -> None:
+    fill(tmp_path, video, "a.mp4", "b.mov", "photo.jpg", "deep/c.mp4")
+    for name in ("._a.mp4", "Thumbs.db", ".DS_Store"):
+        (tmp_path / name).write_bytes(b"\x00\x05\x16\x07litter")
+    with pytest.warns(BootifolWarning) as told:
+        paths = video_paths(sorted(tmp_path.iterdir()))
+    assert [path.name for path in paths] == ["a.mp4", "b.mov", "c.mp4"]
+    said = " ".join(str(found.message) for found in told)
+    assert "Thumbs.db: left there by the system" in said and "photo.jpg: pictures beside videos" in said
+    stills = [tmp_path / "photo.jpg"]
+    assert video_paths(stills) == stills, "and reading it says what is wrong"
 
 
 def test_a_folder_without_videos_says_what_it_holds(tmp_path: Path, video: bytes) -> None:

@@ -1,6 +1,7 @@
 """Files as other programs write them, each kind with its neighbors: every picture once, in its order, at its time."""
 
 import struct
+import warnings
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -296,6 +297,27 @@ def test_the_default_track_is_taken_or_the_largest(
     with pytest.warns(BootifolWarning, match=f"has 2 video tracks .*: number {taken + 1} was taken"):
         shown = next(iter(stream_video(tmp_path / name))).frame
     assert shown.shape[:2] == sizes[taken]
+
+
+def test_a_picture_of_the_file_itself_is_no_track(tmp_path: Path) -> None:
+    with av.open(str(tmp_path / "a.mp4"), "w") as container:
+        streams = [container.add_stream("mjpeg", rate=10), container.add_stream("libx264", rate=10)]
+        for stream, (height, width) in zip(streams, [(96, 128), (48, 64)], strict=True):
+            stream.height, stream.width = height, width
+            stream.pix_fmt = "yuvj420p" if stream is streams[0] else "yuv420p"
+        streams[0].disposition = av.stream.Disposition.attached_pic
+        for t in range(3):
+            for stream in streams if t == 0 else streams[1:]:
+                frame = av.VideoFrame.from_ndarray(
+                    numbered(3, stream.height, stream.width)[t], format="rgb24"
+                )
+                frame.pts, frame.time_base = t, Fraction(1, 10)
+                container.mux(stream.encode(frame.reformat(format=stream.pix_fmt)))
+        for stream in streams:
+            container.mux(stream.encode(None))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", BootifolWarning)
+        assert numbers(tmp_path / "a.mp4") == [0, 1, 2]
 
 
 FRAGMENTED = {"movflags": "frag_keyframe+empty_moov+default_base_moof"}

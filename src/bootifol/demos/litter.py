@@ -6,6 +6,7 @@ from pathlib import Path
 
 _NAMES = frozenset(
     {
+        ".ds_store",
         "thumbs.db",
         "ehthumbs.db",
         "ehthumbs_vista.db",
@@ -33,4 +34,9 @@ def is_litter(path: Path) -> bool:
     name = path.name.lower()
     if name.endswith(".icloud"):
         return False  # stands for a file that is not downloaded yet
-    return name.startswith((".", "~$")) or name.endswith("~") or name in _NAMES
+    return name.startswith((".", "~$")) or name.endswith("~") or is_systems_own(path)
+
+
+def is_systems_own(path: Path) -> bool:
+    """Whether a name is one that a system gives to files of its own."""
+    return path.name.lower() in _NAMES

@@ -10,7 +10,7 @@ from bootifol.demos.animations import stream_animation
 from bootifol.demos.decoding import declared_rate, stream_file
 from bootifol.demos.folders_and_arrays import stream_archive, stream_array, stream_folder
 from bootifol.demos.kinds import PREVIEWS, UNFINISHED, Kind, is_apple_double, kind_of, refuse_stand_in
-from bootifol.demos.litter import children
+from bootifol.demos.litter import children, is_systems_own
 from bootifol.demos.picture_order import natural_order
 from bootifol.demos.upright import TimedFrame
 from bootifol.errors import BootifolError, warn
@@ -45,10 +45,22 @@ def video_paths(paths: Sequence[Path]) -> list[Path]:
                     "of them or of pictures (png, jpg, webp, bmp, tif)"
                 )
             found += inside
-        elif path.is_file() and is_apple_double(path):
-            left_out["notes of macOS about other files"].append(path)
+        elif path.is_file() and (is_apple_double(path) or is_systems_own(path)):
+            left_out["left there by the system"].append(path)
         else:
             found.append(path)
+    # As `folder/*` names them.
+    stills = [
+        path
+        for path in found
+        if path.is_file() and path.suffix.lower() != ".gif" and kind_of(path) == "picture"
+    ]
+    if len(stills) < len(found):
+        found = [path for path in found if path not in set(stills)]
+        left_out["pictures beside videos"] += stills
+    for reason, files in list(left_out.items()):
+        if not files:
+            del left_out[reason]
     for reason, files in left_out.items():
         warn(f"left out {', '.join(_few([str(file) for file in files]))}: {reason}")
     return found
