@@ -111,6 +111,21 @@ def test_import_for_a_task_takes_its_pace_and_length(
     assert (found.frames, found.frames_per_second) == (61, 20.0)
 
 
+def test_a_task_without_a_rate_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "envs")
+    np.save(tmp_path / "film.npy", np.zeros((9, 20, 20, 3), np.uint8))
+    words = ["demos", "import", str(tmp_path / "film.npy"), "--out", str(tmp_path / "out"), "--size", "16"]
+    assert main([*words, "--task", "tiny_environments:make_without_time"]) == 0
+    told = capsys.readouterr()
+    assert "note: tiny_environments:make_without_time does not say how many pictures a second" in told.err
+    assert (
+        "1 shorter than 201 frames, as long as an episode of tiny_environments:make_without_time" in told.out
+    )
+    assert "--frames 9 would leave none standing" in told.out
+
+
 def test_import_refuses_what_a_task_cannot_tell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     np.save(tmp_path / "film.npy", np.zeros((9, 20, 20, 3), np.uint8))
     words = ["demos", "import", str(tmp_path / "film.npy"), "--out", str(tmp_path / "out")]

@@ -8,7 +8,7 @@ from typing import Literal
 from bootifol.cli.arguments import DemosPath, VideoPaths
 from bootifol.demos.manifest import Manifest
 from bootifol.demos.matching import Match
-from bootifol.errors import STOPPED, BootifolError
+from bootifol.errors import STOPPED, BootifolError, warn
 
 
 def record(
@@ -119,6 +119,11 @@ def import_(
         shown = task_named(task, action_repeat)
         frames = shown.episode_steps + 1 if frames is None else frames
         fps = frames_per_second(shown) if fps is None else fps
+        if fps is None:
+            warn(
+                f"{task} does not say how many pictures a second it shows (render_fps), so every picture of the videos "
+                "is kept: give --fps where they were filmed at another pace"
+            )
     elif action_repeat is not None:
         raise BootifolError("--action-repeat changes the pace of a task: say of which with --task")
     conversion = Conversion(
