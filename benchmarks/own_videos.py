@@ -31,6 +31,7 @@ from PIL import Image
 
 from benchmarks.command import command
 from benchmarks.resumable_table import ResumableTable
+from benchmarks.rows import Row
 from bootifol.cli.main import main as bootifol
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.import_videos import Conversion, import_videos
@@ -199,19 +200,24 @@ def drawn(table: ResumableTable) -> Figure:
         left.minorticks_off()
         left.set_xlabel("videos, undisturbed")
         left.set_ylabel("scaled return")
-        kinds = ["none", "jitter", "exposure", "h265", "aspect", "phone", "phone, matched"]
-        for row in table.rows:
-            name = row["disturbance"] + (", matched" if row["matched"] == "True" else "")
-            if row["videos"] == "50" and name in kinds:
-                _dot(right, kinds.index(name), row, "#D55E00" if row["matched"] == "True" else "#0B5394")
-        right.set_xticks(range(len(kinds)), kinds, rotation=25, ha="right")
+        fifty = [row for row in table.rows if row["videos"] == "50"]
+        order = ["none", "jitter", "exposure", "h265", "aspect", "phone", "phone, matched"]
+        kinds = [name for name in order if name in map(_kind, fifty)]
+        for row in fifty:
+            _dot(right, kinds.index(_kind(row)), row, "#D55E00" if row["matched"] == "True" else "#0B5394")
+        right.set_xticks(range(len(kinds)), kinds)
+        right.margins(x=0.2)
         right.set_xlabel("what happened to 50 videos")
         for axes in (left, right):
             axes.axhline(1.0, color="#7A7F87", linewidth=0.8)
         return figure
 
 
-def _dot(axes: Axes, place: float, row: dict[str, str], color: str) -> None:
+def _kind(row: Row) -> str:
+    return row["disturbance"] + (", matched" if row["matched"] == "True" else "")
+
+
+def _dot(axes: Axes, place: float, row: Row, color: str) -> None:
     value, low, high = (float(row[name]) for name in ("scaled_return", "low", "high"))
     axes.errorbar(
         place, value, yerr=[[value - low], [high - value]], fmt="o", color=color, markersize=4, linewidth=1
