@@ -6,6 +6,10 @@ import dataclasses
 import math
 import reprlib
 import typing
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 STOPPED = 130
 """Exit code of a command that was asked to stop before its end, as shells give it after Ctrl-C."""
@@ -53,6 +57,38 @@ def is_lack_of_memory(error: BaseException) -> bool:
     """Whether an error says that an array or a tensor does not fit in memory; PyTorch's has no class of its own."""
     words = ("allocate memory", "out of memory", "Storage size calculation overflowed", "numel")
     return isinstance(error, MemoryError) or any(word in str(error) for word in words)
+
+
+class BootifolWarning(UserWarning):
+    """What was taken one way where another was possible, or left out: a sentence, and the file it is about.
+
+    The command line prints it as a line that begins with `note:`.
+    """
+
+    def __init__(self, what: str, where: Path | None = None) -> None:
+        super().__init__(what if where is None else f"{where}: {what}")
+        self.what = what
+        self.where = where
+
+
+def warn(what: str, where: Path | None = None) -> None:
+    """Issues a `BootifolWarning`."""
+    warnings.warn(BootifolWarning(what, where), stacklevel=2)
+
+
+@contextmanager
+def collected_warnings() -> Iterator[list[BootifolWarning]]:
+    """Yields a list that holds, after the block, every `BootifolWarning` of it; they are not shown."""
+    collected: list[BootifolWarning] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", BootifolWarning)
+        try:
+            yield collected
+        finally:
+            collected += [found.message for found in caught if isinstance(found.message, BootifolWarning)]
+    for found in caught:
+        if not isinstance(found.message, BootifolWarning):
+            warnings.warn_explicit(found.message, found.category, found.filename, found.lineno)
 
 
 def fields_of(what: str, config: object, *names: str) -> dict[str, float]:

@@ -273,6 +273,7 @@ def short_name(task_name: str) -> str:
 def _gymnasium_task(name: str) -> Task:
     """The environment is made once to see whether it can be used, and how long its episodes are."""
     simulator = _gymnasium_simulator(name, PictureConfig())
+    simulator.require_sights()
     steps = simulator.time_limit or UNLIMITED_STEPS
     simulator.close()
     return Task(

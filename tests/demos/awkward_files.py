@@ -58,6 +58,7 @@ def make_all(directory: Path) -> list[Awkward]:
         _alpha,
         _folders,
         _arrays,
+        _other_programs,
         _broken,
     ]
     return [file for make in makers for file in make(directory)]
@@ -253,6 +254,47 @@ def _arrays(directory: Path) -> list[Awkward]:
         Awkward(directory / "objects.npy", refusal="damaged or no numpy array"),
         Awkward(directory / "cut.npy", refusal="damaged or no numpy array"),
     ]
+
+
+def _other_programs(directory: Path) -> list[Awkward]:
+    """Pictures that are stored in another order, hidden, held or transparent."""
+    b_frames = encode(directory / "b_frames.avi", scene(), options={"bf": "3"})
+    shown = np.concatenate([scene(), np.full((12, 48, 64, 1), 255, np.uint8)], axis=-1)
+    shown[:, 30:, :, 3] = 0
+    white = scene()
+    white[:, 30:] = 255
+    group = "keyint=6:min-keyint=6:open-gop=1:scenecut=0:bframes=2"
+    trimmed = encode(directory / "trimmed.mp4", scene(), options={"x264-params": group})
+    data = bytearray(trimmed.read_bytes())
+    entry = data.index(b"elst") + 12
+    with av.open(str(trimmed)) as container:
+        tick = container.streams.video[0].time_base
+    assert tick is not None
+    duration, start = struct.unpack(">Ii", data[entry : entry + 8])
+    data[entry : entry + 8] = struct.pack(">Ii", duration * 5 // 12, start + int(Fraction(7, RATE) / tick))
+    trimmed.write_bytes(data)
+    first, *others = map(Image.fromarray, scene())
+    times = [100 * t + 400 * (t > 5) for t in range(12)]
+    lasts = [100] * 5 + [500] + [100] * 6
+    animations = []
+    for name in ("held.gif", "held.webp", "held.png"):
+        path = directory / name
+        first.save(path, save_all=True, append_images=others, duration=lasts, lossless=True)
+        animations.append(Awkward(path, scene(), [time / 1000 for time in times], tolerance=10))
+    return [
+        Awkward(b_frames, scene(), [t / RATE for t in range(12)]),
+        Awkward(trimmed, scene()[7:]),
+        Awkward(encode(directory / "hidden.webm", shown, "libvpx-vp9", "yuva420p"), white, tolerance=10),
+        Awkward(encode(directory / "stream.ts", scene(), options={"bf": "2"}), scene()),
+        Awkward(
+            encode(directory / "fragments.mp4", scene(), options={"g": "4"}, container_options=_FRAGMENTED),
+            scene(),
+        ),
+        *animations,
+    ]
+
+
+_FRAGMENTED = {"movflags": "frag_keyframe+empty_moov"}
 
 
 def _broken(directory: Path) -> list[Awkward]:

@@ -162,14 +162,22 @@ def test_a_contact_sheet_shows_a_video_a_row_from_first_to_last_frame() -> None:
     videos += np.arange(21, dtype=np.uint8)[None, :, None, None, None] + np.array([0, 100], np.uint8).reshape(
         2, 1, 1, 1, 1
     )
-    sheet = contact_sheet(videos, columns=3)
-    assert sheet.shape == (2 * 98 + 2, 3 * 98 + 2, 3)
-    middles = sheet[[50, 148]][:, [50, 148, 246], 0]
+    sheet = contact_sheet(videos, ["first", "second"], columns=3)
+    assert sheet.shape == (2 * 118 + 4, 3 * 100 + 4, 3)
+    middles = sheet[[66, 184]][:, [52, 152, 252], 0]
     assert middles.tolist() == [[0, 10, 20], [100, 110, 120]]
+    assert (sheet[17, 4:100] < 200).all() and (sheet[18:114, 3] < 200).all(), "a border around every picture"
+    names = [sheet[top : top + 17].min(axis=(1, 2)) for top in (0, 118)]
+    assert all((rows < 50).any() for rows in names), "a name above every row"
+
+
+def test_white_pictures_can_be_told_from_the_sheet() -> None:
+    sheet = contact_sheet(np.full((1, 2, 96, 96, 3), 255, np.uint8), ["white"])
+    assert (sheet[60, [3, 100, 103, 200]] < 200).all()
 
 
 def test_short_videos_fill_fewer_columns() -> None:
-    assert contact_sheet(np.zeros((1, 2, 96, 96, 3), np.uint8), columns=10).shape == (100, 198, 3)
+    assert contact_sheet(np.zeros((1, 2, 96, 96, 3), np.uint8), ["short"], columns=10).shape == (122, 204, 3)
 
 
 def test_a_contact_sheet_of_a_damaged_directory_is_not_written(write_set: WriteSet, tmp_path: Path) -> None:

@@ -62,6 +62,7 @@ def test_ctrl_c_says_how_to_go_on(
     assert record(tmp_path / "demos") == 0
 
 
+@pytest.mark.filterwarnings("ignore::bootifol.errors.BootifolWarning")
 def test_import_takes_a_folder_of_videos(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "films"
     folder.mkdir()
@@ -76,8 +77,8 @@ def test_import_takes_a_folder_of_videos(tmp_path: Path, capsys: pytest.CaptureF
     assert [int(demo_set[i].frames[0, 0, 0, 0]) for i in range(3)] == [1, 2, 10]
     printed = capsys.readouterr().out
     assert "3 videos of 9 frames, 16×16 pixels, from 3 files" in printed
-    assert "3 shorter than 9 frames" in printed
-    assert "--out runs/TASK --pictures.video-size 16 --pictures.agent-size 16\n" in printed
+    assert "3 shorter than 9 frames: they stand still on their last picture; --frames 7 would" in printed
+    assert f"next: bootifol demos check {out}  (" in printed
     assert tyro.cli(demos.check, args=[str(out), "--task", "drawn_reach"]) == 1
     printed = capsys.readouterr().out
     assert "import them again with --frames 31" in printed
@@ -108,6 +109,21 @@ def test_import_for_a_task_takes_its_pace_and_length(
     assert (found.frames, found.frames_per_second) == (9, 20.0), "what is given goes before"
     found = imported("d")
     assert (found.frames, found.frames_per_second) == (61, 20.0)
+
+
+def test_a_task_without_a_rate_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "envs")
+    np.save(tmp_path / "film.npy", np.zeros((9, 20, 20, 3), np.uint8))
+    words = ["demos", "import", str(tmp_path / "film.npy"), "--out", str(tmp_path / "out"), "--size", "16"]
+    assert main([*words, "--task", "tiny_environments:make_without_time"]) == 0
+    told = capsys.readouterr()
+    assert "note: tiny_environments:make_without_time does not say how many pictures a second" in told.err
+    assert (
+        "1 shorter than 201 frames, as long as an episode of tiny_environments:make_without_time" in told.out
+    )
+    assert "--frames 9 would leave none standing" in told.out
 
 
 def test_import_refuses_what_a_task_cannot_tell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -242,3 +242,46 @@ def test_a_folder_of_datasets_is_found(whole: Path, tmp_path: Path) -> None:
     assert video_paths([whole.parent]) == [whole]
     assert len(import_videos(video_paths([whole.parent]), tmp_path / "out", Conversion(3, 16))) == 3
     assert len(DemoSet.open(tmp_path / "out")) == 3
+
+
+CAMERA = "videos/observation.images.front"
+
+
+@pytest.mark.parametrize("drift", [-0.4, -0.1, 0.1, 0.4, 1.3])
+def test_episodes_are_counted_where_their_times_drift(dataset: Path, drift: float) -> None:
+    rows = read_rows(dataset)
+    for row in rows:
+        for name in ("from_timestamp", "to_timestamp"):
+            row[f"{CAMERA}/{name}"] = max(0.0, row[f"{CAMERA}/{name}"] + drift * row["episode_index"] / RATE)
+    write_rows(dataset, rows)
+    assert levels_of(dataset) == FILES[0] + FILES[1]
+
+
+def test_times_must_be_those_of_pictures_where_the_file_holds_others(dataset: Path) -> None:
+    write_file(dataset / CAMERA / "chunk-000/file-000.mp4", [10, 20, 30, 99, 99, 40, 50, 60, 70, 80])
+    rows = read_rows(dataset)
+    for name in ("from_timestamp", "to_timestamp"):
+        rows[1][f"{CAMERA}/{name}"] += 2 / RATE
+    write_rows(dataset, rows)
+    assert levels_of(dataset) == FILES[0] + FILES[1], "an episode was taken out of the table alone"
+    rows[1][f"{CAMERA}/from_timestamp"] += 0.4 / RATE
+    write_rows(dataset, rows)
+    with pytest.raises(
+        BootifolError, match=r"episode 1 of .*should begin at 0\.540 s of .* where no picture begins"
+    ):
+        levels_of(dataset)
+
+
+def test_notes_of_macos_in_a_dataset_are_no_matter(dataset: Path) -> None:
+    for folder in ("meta/episodes/chunk-000/._file-000.parquet", f"{CAMERA}/chunk-000/._file-000.mp4"):
+        (dataset / folder).write_bytes(b"\x00\x05\x16\x07")
+    assert levels_of(dataset) == FILES[0] + FILES[1]
+
+
+@pytest.mark.parametrize(
+    "file", ["meta/info.json", "meta/episodes/chunk-000/file-000.parquet", f"{CAMERA}/chunk-000/file-000.mp4"]
+)
+def test_pointers_of_git_lfs_say_what_to_type(dataset: Path, file: str) -> None:
+    (dataset / file).write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 5\n")
+    with pytest.raises(BootifolError, match="git lfs pull"):
+        levels_of(dataset)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import random
 from typing import Any
 
 import gymnasium
@@ -108,3 +110,179 @@ def register() -> None:
             gymnasium.register(identifier, kind, max_episode_steps=steps, kwargs=changes)
     if "Tiny/Missing-v0" not in gymnasium.registry:
         gymnasium.register("Tiny/Missing-v0", "a_package_that_is_missing:Environment")
+
+
+class OldReset(Slide):
+    """As gym before 0.26: seeded by a method, and `reset` returns the observation alone."""
+
+    def seed(self, seed: int | None = None) -> list[int | None]:
+        self.np_random = np.random.default_rng(seed)
+        return [seed]
+
+    def reset(self) -> Any:  # type: ignore[override]
+        self.place, self.steps = float(self.np_random.uniform(-0.9, 0.5)), 0
+        return {"place": np.float32([self.place])}
+
+
+class OldStep(Slide):
+    """Four values; its end is a time limit where `cut_at` says so."""
+
+    def step(self, action: Any) -> Any:
+        observation, reward, ended, cut, info = super().step(action)
+        return observation, reward, ended or cut, info | ({"TimeLimit.truncated": True} if cut else {})
+
+
+class Answering(Slide):
+    """Answers a step with one thing changed: `reward`, `info` or `values`."""
+
+    def __init__(self, render_mode: str | None = "rgb_array", **changed: Any) -> None:
+        super().__init__(render_mode)
+        self.changed = changed
+
+    def step(self, action: Any) -> Any:
+        observation, reward, ended, cut, info = super().step(action)
+        ended = self.changed.get("ended", ended)
+        answer = (observation, self.changed.get("reward", reward), ended, cut, self.changed.get("info", info))
+        return answer[: self.changed.get("values", 5)]
+
+
+class SeedIgnored(Slide):
+    """Draws its starts as `draw` says, whatever seed it is given."""
+
+    def __init__(self, draw: str) -> None:
+        super().__init__("rgb_array")
+        self.draw = draw
+        self.own = np.random.default_rng()
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Any, dict[str, Any]]:
+        drawn = {
+            "numpy": lambda: np.random.uniform(-0.9, 0.5),
+            "python": lambda: random.uniform(-0.9, 0.5),
+            "before it seeds": lambda: self.np_random.uniform(-0.9, 0.5),
+            "its own": lambda: self.own.uniform(-0.9, 0.5),
+        }
+        self.place, self.steps = float(drawn[self.draw]()), 0
+        return {"place": np.float32([self.place])}, {}
+
+
+class Private(Slide):
+    """Keeps its generator to itself, and `reset` knows no info."""
+
+    np_random = property(lambda self: self._generator)  # type: ignore[assignment]
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+        self._generator = np.random.default_rng(seed)
+        self.place, self.steps = float(self._generator.uniform(-0.9, 0.5)), 0
+        return {"place": np.float32([self.place])}, None
+
+
+class Blank(Slide):
+    """Draws nothing before a step, or nothing with SDL's dummy driver, as highway-env."""
+
+    def __init__(self, until_step: int = 0, color: int = 0) -> None:
+        super().__init__("rgb_array")
+        self.until_step, self.color = until_step, color
+
+    def render(self) -> Any:
+        picture = super().render()
+        if os.environ.get("SDL_VIDEODRIVER") == "dummy" or self.steps < self.until_step:
+            picture[:] = self.color
+        return picture
+
+
+def make_old_reset() -> gymnasium.Env[Any, Any]:
+    return OldReset("rgb_array")
+
+
+def make_old_reset_wrapped() -> gymnasium.Env[Any, Any]:
+    return gymnasium.wrappers.TimeLimit(gymnasium.wrappers.OrderEnforcing(OldReset("rgb_array")), 9)
+
+
+def make_old_step() -> gymnasium.Env[Any, Any]:
+    return OldStep("rgb_array", cut_at=3)
+
+
+def make_old_step_wrapped() -> gymnasium.Env[Any, Any]:
+    return gymnasium.wrappers.TransformReward(OldStep("rgb_array"), lambda reward: 2 * reward)
+
+
+def make_array_reward() -> gymnasium.Env[Any, Any]:
+    return Answering(reward=np.array([[0.5]], np.float32))
+
+
+def make_two_rewards() -> gymnasium.Env[Any, Any]:
+    return Answering(reward=np.array([0.5, 1.0]))
+
+
+def make_no_reward() -> gymnasium.Env[Any, Any]:
+    return Answering(reward=None)
+
+
+def make_two_ends() -> gymnasium.Env[Any, Any]:
+    return Answering(ended=np.array([False, True]))
+
+
+def make_worded_reward() -> gymnasium.Env[Any, Any]:
+    return Answering(reward="good")
+
+
+def make_no_info() -> gymnasium.Env[Any, Any]:
+    return Answering(info=None)
+
+
+def make_array_success() -> gymnasium.Env[Any, Any]:
+    return Answering(info={"success": np.array([1.0])})
+
+
+def make_two_successes() -> gymnasium.Env[Any, Any]:
+    return Answering(info={"success": np.array([True, False])})
+
+
+def make_three_values() -> gymnasium.Env[Any, Any]:
+    return Answering(values=3)
+
+
+def make_diverging() -> gymnasium.Env[Any, Any]:
+    environment = Slide("rgb_array")
+
+    def step(action: Any) -> Any:
+        raise RuntimeError("Physics diverged")
+
+    environment.step = step  # type: ignore[method-assign]
+    return environment
+
+
+def make_ignoring_numpy() -> gymnasium.Env[Any, Any]:
+    return SeedIgnored("numpy")
+
+
+def make_ignoring_python() -> gymnasium.Env[Any, Any]:
+    return SeedIgnored("python")
+
+
+def make_ignoring_before() -> gymnasium.Env[Any, Any]:
+    return SeedIgnored("before it seeds")
+
+
+def make_ignoring_own() -> gymnasium.Env[Any, Any]:
+    return SeedIgnored("its own")
+
+
+def make_blank() -> gymnasium.Env[Any, Any]:
+    return Blank(until_step=10**9)
+
+
+def make_blank_white() -> gymnasium.Env[Any, Any]:
+    return Blank(until_step=10**9, color=255)
+
+
+def make_blank_at_first() -> gymnasium.Env[Any, Any]:
+    return Blank(until_step=4)
+
+
+def make_blank_if_dummy() -> gymnasium.Env[Any, Any]:
+    return Blank()
+
+
+def make_private() -> gymnasium.Env[Any, Any]:
+    return Private("rgb_array")

@@ -1,4 +1,4 @@
-"""`bootifol demos record | import | check | export`: videos in and out."""
+"""`bootifol demos record | import | check | match | export`: videos in and out."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Literal
 
 from bootifol.cli.arguments import DemosPath, VideoPaths
 from bootifol.demos.manifest import Manifest
-from bootifol.errors import STOPPED, BootifolError
+from bootifol.demos.matching import Match
+from bootifol.errors import STOPPED, BootifolError, warn
 
 
 def record(
@@ -22,8 +23,9 @@ def record(
     video_size: int = 64,
     profile: Literal["fast", "balanced", "full"] = "fast",
     workers: int = 1,
+    policy: str | None = None,
 ) -> int:
-    """Record videos of a task's bundled expert, and of others for comparison.
+    """Record videos of a task's bundled expert, or of a policy of yours, and of others for comparison.
 
     Each behavior becomes a demo set of its own: OUT/expert, OUT/random (the method learns to tell it from the expert)
     and OUT/half_good (at most 64 videos, to see whether the learned reward ranks them between the two). Pictures only:
@@ -41,6 +43,8 @@ def record(
         video_size: Height and width of the videos, in pixels.
         profile: Render quality; training must use the same. fast costs a tenth of full.
         workers: Processes that record side by side; the videos are the same for any number.
+        policy: Who plays the expert in a Gymnasium environment: MODULE:FUNCTION, a function of yours that is called
+            with what the environment observes and returns an action of it.
     """
     # Imported here: the simulators would slow down every other command's help.
     from bootifol.demos.record import record_demos
@@ -51,7 +55,7 @@ def record(
     pictures = PictureConfig(agent_size=agent_size, video_size=video_size, profile=profile)
     try:
         recorded = record_demos(
-            task, out, episodes, behaviors, pictures, seed, episode_steps, workers, action_repeat
+            task, out, episodes, behaviors, pictures, seed, episode_steps, workers, action_repeat, policy
         )
         for behavior, demo_set in recorded.items():
             print(f"{out / behavior}: {_summary(demo_set.manifest)}")
@@ -85,7 +89,7 @@ def import_(
     behavior: Literal["expert", "half_good", "random"] = "expert",
     camera: str | None = None,
 ) -> int:
-    """Make a demo set from your own videos: mp4, mov, webm, avi or gif files, folders of pictures, .npy arrays.
+    """Make a demo set from your own videos: mp4, mov, webm, avi, gif … files, folders of pictures, .npy arrays.
 
     A .npz archive may hold one such array among others. A LeRobot dataset of format v3 (its directory) gives one
     video an episode: its pictures alone, never its actions or states.
@@ -95,7 +99,7 @@ def import_(
     written down in OUT/BEHAVIOR/manifest.json, and OUT/BEHAVIOR/contact_sheet.png shows the result.
 
     Args:
-        videos: Files, and folders of them; a folder of pictures is one video.
+        videos: Files, and folders of them at any depth; a folder of pictures is one video.
         out: Directory of the demo sets, the one to give to `bootifol train --demos`.
         task: What the videos show; its environment says --fps and --frames, unless they are given.
         action_repeat: Simulator steps an agent step, with --task, if training shall have others than the task's own.
@@ -108,14 +112,18 @@ def import_(
         camera: Which camera of a LeRobot dataset to take, when it has several.
     """
     from bootifol.demos.import_videos import Conversion, import_videos
-    from bootifol.demos.video_files import video_paths
     from bootifol.tasks import frames_per_second, task_named
 
-    files = video_paths(videos)
+    lengths_of_task = task is not None and frames is None
     if task is not None:
         shown = task_named(task, action_repeat)
         frames = shown.episode_steps + 1 if frames is None else frames
         fps = frames_per_second(shown) if fps is None else fps
+        if fps is None:
+            warn(
+                f"{task} does not say how many pictures a second it shows (render_fps), so every picture of the videos "
+                "is kept: give --fps where they were filmed at another pace"
+            )
     elif action_repeat is not None:
         raise BootifolError("--action-repeat changes the pace of a task: say of which with --task")
     conversion = Conversion(
@@ -125,18 +133,26 @@ def import_(
         frames_per_second=fps,
         windows=windows,
     )
-    demo_set = import_videos(files, out / behavior, conversion, behavior, camera=camera)
+    demo_set = import_videos(videos, out / behavior, conversion, behavior, camera=camera)
     manifest = demo_set.manifest
     short = sum(video.length < manifest.frames for video in manifest.videos)
     recordings = sum(video.source["first_frame"] == 0 for video in manifest.videos)
     what = "episode" if all("episode" in video.source for video in manifest.videos) else "file"
     print(f"{demo_set.path}: {_summary(manifest)}, from {_count(recordings, what)}")
     if short:
-        print(f"  {short} shorter than {manifest.frames} frames: they stand still on their last picture")
+        shortest = min(video.length for video in manifest.videos)
+        because = f", as long as an episode of {task}" if lengths_of_task else ""
+        print(
+            f"  {short} shorter than {manifest.frames} frames{because}: they stand still on their last picture; "
+            f"--frames {max(shortest, 2)} would leave none standing"
+        )
     print(f"  look at {demo_set.path / 'contact_sheet.png'}")
-    train = _train_words(task or "TASK", out, manifest)
+    if task is None:
+        print(f"next: bootifol demos check {out}  (bootifol tasks lists what --task can compare it with)")
+        return 0
+    train = _train_words(task, out, manifest)
     repeat = "" if action_repeat is None else f" --action-repeat {action_repeat}"
-    print(f"next: bootifol demos check {out} --task {task or 'TASK'}{repeat}, then bootifol {train}{repeat}")
+    print(f"next: bootifol demos check {out} --task {task}{repeat}, then bootifol {train}{repeat}")
     return 0
 
 
@@ -180,10 +196,84 @@ def check(
             print(f"  {difference}")
         if task is not None and not checked.differences:
             print(f"  fits the task {task}")
+        if task is not None and checked.looks_differ and manifest.task is None:
+            print(
+                f"  light, colors, place and background can be repaired: bootifol demos match {demos} --task {task}"
+            )
         shown = f" and {checked.first_frames}" if checked.first_frames is not None else ""
         print(f"  look at {checked.contact_sheet}{shown}")
         fits = fits and not checked.differences
     return 0 if fits else 1
+
+
+def match(
+    demos: DemosPath,
+    task: str,
+    out: Path | None = None,
+    repairs: tuple[Literal["crop", "colors", "exposure", "background"], ...] = (
+        "crop",
+        "colors",
+        "exposure",
+        "background",
+    ),
+    episode_steps: int | None = None,
+    action_repeat: int | None = None,
+) -> int:
+    """Bring imported videos toward the pictures of an environment, as a new directory of demo sets.
+
+    What `demos check` finds different is fitted on median pictures, in which what moves does not show, and taken back:
+    a square that shows what the environment shows; light and white balance; exposure that changes within a video; and
+    a background that is nearly the environment's. Only what brings the pictures nearer is done, and the manifest says
+    what. Recorded sets are copied.
+
+    Args:
+        demos: Directory of the demo sets, or one of them; it stays as it is.
+        task: Whose environment shows how the videos should look.
+        out: Directory to write; by default the name of DEMOS and _matched.
+        repairs: Which may be made.
+        episode_steps: Agent steps of an episode of the task, if training shall have others than the task's own.
+        action_repeat: Simulator steps an agent step, if training shall have others than the task's own.
+    """
+    from bootifol.demos.manifest import read_manifest
+    from bootifol.demos.match_set import match_demo_sets
+    from bootifol.tasks import task_named
+
+    target = demos.with_name(f"{demos.resolve().name}_matched") if out is None else out
+    matched = match_demo_sets(demos, task_named(task, action_repeat, episode_steps), target, repairs)
+    for result in matched.values():
+        if result.match is None:
+            print(f"{result.path}: copied, for it was recorded in an environment")
+            continue
+        print(f"{result.path}: {_what_was_done(result.match)}")
+        print(
+            f"  the usual first picture differs from the environment's by {result.after:.1f} levels of 255 instead of "
+            f"{result.before:.1f}; look at {result.path / 'first_frames.png'}"
+        )
+        for sentence in result.remaining:
+            print(f"  {sentence}")
+    lengths = {"episode-steps": episode_steps, "action-repeat": action_repeat}
+    others = "".join(f" --{name} {value}" for name, value in lengths.items() if value is not None)
+    train = _train_words(task, target, read_manifest(next(iter(matched.values())).path))
+    print(f"next: bootifol demos check {target} --task {task}{others}, then bootifol {train}{others}")
+    return 0
+
+
+def _what_was_done(match: Match) -> str:
+    done = []
+    if match.crop is not None:
+        left, top, side = match.crop
+        done.append(f"the square of {side} pixels at {left}, {top} was enlarged")
+    if (match.gain, match.offset) != ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0)):
+        gains, offsets = (
+            ", ".join(f"{value:{kind}}" for value in values)
+            for values, kind in ((match.gain, ".2f"), (match.offset, "+.0f"))
+        )
+        done.append(f"red, green and blue were multiplied by {gains} and moved by {offsets} levels")
+    if match.usual is not None:
+        done.append("each picture was exposed like the others")
+    if match.background is not None:
+        done.append("the background gave way to the environment's")
+    return "; ".join(done) or "nothing was to be done"
 
 
 def export(

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import functools
 import sys
+import warnings
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import tyro
 from rich.console import Console
 from rich.text import Text
 
 from bootifol.cli.help_texts import join_lines
-from bootifol.errors import STOPPED, BootifolError, is_lack_of_memory, printable
+from bootifol.errors import STOPPED, BootifolError, BootifolWarning, is_lack_of_memory, printable
 from bootifol.output import output_may_fail
 from bootifol.own_modules import told
 
@@ -27,7 +29,7 @@ A first tour, about three minutes without a simulator:
 `bootifol doctor` says what this machine can do, `bootifol tasks` what there is to learn.
 """
 
-DEMOS_DESCRIPTION = "Make, import, check and export sets of videos to learn from."
+DEMOS_DESCRIPTION = "Make, import, check, match and export sets of videos to learn from."
 EXPERTS_DESCRIPTION = "Train who performs a task in recordings, where none is bundled."
 
 
@@ -40,8 +42,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after bad input, which one sentence explains, or 130 after an interruption.
     """
-    with output_may_fail():
-        return _exit_code(list(sys.argv[1:] if arguments is None else arguments))
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    with output_may_fail(), warnings.catch_warnings():
+        warnings.simplefilter("always", BootifolWarning)
+        warnings.showwarning = functools.partial(_show_warning, warnings.showwarning)
+        return _exit_code(words)
 
 
 def _exit_code(words: list[str]) -> int:
@@ -70,6 +75,14 @@ def _refused(sentence: str) -> int:
     console = Console(stderr=True, soft_wrap=True, emoji=False)
     console.print(Text.assemble(("error:", "bold red"), f" {printable(sentence)}"))
     return 2
+
+
+def _show_warning(otherwise: Callable[..., None], message: Warning | str, *where: Any) -> None:
+    if isinstance(message, BootifolWarning):
+        console = Console(stderr=True, soft_wrap=True, emoji=False)
+        console.print(Text.assemble(("note:", "yellow"), f" {printable(str(message))}"))
+    else:
+        otherwise(message, *where)
 
 
 def _run(commands: dict[str, Callable[..., int]], words: list[str], prog: str, description: str) -> int:
@@ -108,9 +121,9 @@ def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
 
 
 def _demos_commands() -> dict[str, Callable[..., int]]:
-    from bootifol.cli.demos import check, export, import_, record
+    from bootifol.cli.demos import check, export, import_, match, record
 
-    return {"record": record, "import": import_, "check": check, "export": export}
+    return {"record": record, "import": import_, "check": check, "match": match, "export": export}
 
 
 def _experts_commands() -> dict[str, Callable[..., int]]:
@@ -125,5 +138,5 @@ def _experts_placeholder() -> int:
 
 
 def _demos_placeholder() -> int:
-    """Make, import, check and export sets of videos: demos record, demos import, demos check, demos export."""
+    """Make, import, check, match and export sets of videos: demos record, import, check, match, export."""
     return main(["demos", "--help"])

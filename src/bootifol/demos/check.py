@@ -101,6 +101,8 @@ class CheckedSet:
     defects: Defects
     differences: tuple[str, ...]
     """How the set differs from the task, each with what to do; empty without a task."""
+    looks_differ: bool
+    """Whether any of the differences is of light, color or place."""
     contact_sheet: Path
     first_frames: Path | None
     """First frames of videos and environment; None without a task, or when the videos show another one."""
@@ -121,17 +123,19 @@ def check_demo_set(path: Path, task: Task | None = None) -> CheckedSet:
     looks = _look_at_all(demo_set)
     found = differences(manifest, task) if task is not None else []
     picture = None
+    looks_of_videos: list[str] = []
     if task is not None and manifest.task in (None, task.name):
         videos = np.stack([video.first for video in looks])
         pictures = PictureConfig()
-        environment = first_frames(task, replace(pictures, **_shown_like(manifest, pictures)))
+        environment = first_frames(task, replace(pictures, **shown_like(manifest, pictures)))
         picture = write_first_frames(path, videos, environment)
-        found += differences_of_looks(videos, environment, path / FIRST_FRAMES_NAME)
+        looks_of_videos = differences_of_looks(videos, environment, path / FIRST_FRAMES_NAME)
     return CheckedSet(
         manifest=manifest,
         bytes_on_disk=sum(shard.bytes for shard in manifest.shards),
         defects=find_defects(manifest, looks),
-        differences=tuple(found),
+        differences=(*found, *looks_of_videos),
+        looks_differ=bool(looks_of_videos),
         contact_sheet=write_contact_sheet(path, demo_set),
         first_frames=picture,
     )
@@ -169,7 +173,7 @@ def find_defects(manifest: Manifest, looks: Sequence[Looks]) -> Defects:
         half_frozen=() if still or manifest.behavior == "half_good" else _named(entries, half_frozen),
         blank=_named(entries, [index for index, video in enumerate(looks) if video.blank]),
         cut=tuple(
-            f"{_name(entry)} at frame {video.cut}"
+            f"{entry.described} at frame {video.cut}"
             for entry, video in zip(entries, looks, strict=True)
             if video.cut is not None
         ),
@@ -187,17 +191,7 @@ def _look_at_all(demo_set: DemoSet) -> list[Looks]:
 
 
 def _named(entries: Sequence[VideoEntry], indices: Sequence[int]) -> tuple[str, ...]:
-    return tuple(_name(entries[index]) for index in indices)
-
-
-def _name(entry: VideoEntry) -> str:
-    """The video's name, and for imported ones where to find it."""
-    if "file" not in entry.source:
-        return entry.name
-    episode = f" episode {entry.source['episode']}" if "episode" in entry.source else ""
-    start = entry.source.get("first_frame")
-    window = f" from frame {start} on" if start else ""
-    return f"{entry.name} ({entry.source['file']}{episode}{window})"
+    return tuple(entries[index].described for index in indices)
 
 
 def differences(manifest: Manifest, task: Task, pictures: PictureConfig | None = None) -> list[str]:
@@ -277,12 +271,12 @@ def picture_flags(manifest: Manifest, pictures: PictureConfig) -> str:
     """What a run with these pictures must be told to see the environment as the videos show it; "" for nothing."""
     return " ".join(
         f"--pictures.{name.replace('_', '-')} {value}"
-        for name, value in _shown_like(manifest, pictures).items()
+        for name, value in shown_like(manifest, pictures).items()
         if value != getattr(pictures, name)
     )
 
 
-def _shown_like(manifest: Manifest, pictures: PictureConfig) -> dict[str, Any]:
+def shown_like(manifest: Manifest, pictures: PictureConfig) -> dict[str, Any]:
     """The sizes and the profile of videos.
 
     Imported ones know no profile and no size for the agent: the run's own remain, but for an agent that would see more

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -12,6 +11,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from bootifol.demos.kinds import kind_of, refuse_stand_in
+from bootifol.demos.litter import children
+from bootifol.demos.picture_order import in_order
 from bootifol.demos.shards import DAMAGED_ARRAY
 from bootifol.demos.upright import TimedFrame, upright_picture
 from bootifol.errors import BootifolError
@@ -22,22 +24,23 @@ LARGEST_UNFOLDED = 1_000_000_000
 LARGEST_RATIO = 100
 """Of an array's bytes to those of its archive; what was drawn with few colors has up to about 50."""
 
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
-
 
 def stream_folder(path: Path) -> Iterator[TimedFrame]:
-    """Reads a folder of pictures as one video, in natural order of their names; errors are `BootifolError`."""
-    pictures = pictures_in(path)
+    """Reads a folder of pictures as one video, in the order of their names; errors are `BootifolError`."""
+    pictures = in_order(pictures_in(path))
     if not pictures:
-        raise BootifolError(f"{path} holds no pictures: a folder should hold one video as png or jpg files")
+        raise BootifolError(
+            f"{path} holds no pictures: a folder should hold one video as png, jpg, webp, bmp or tif files"
+        )
     size: tuple[int, int] | None = None
     for file in pictures:
         if not file.is_file():
             raise BootifolError(f"{file} is no file: take it out of the pictures")
+        refuse_stand_in(file)
         try:
             with Image.open(file) as picture:
                 frame = upright_picture(picture)
-        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        except Exception as error:  # damaged ones make Pillow raise anything
             raise BootifolError(f"{file} is damaged or no picture: {error}") from error
         if size is not None and frame.shape[:2] != size:
             raise BootifolError(
@@ -49,16 +52,8 @@ def stream_folder(path: Path) -> Iterator[TimedFrame]:
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """The pictures of a folder in natural order of their names."""
-    pictures = (file for file in folder.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES)
-    return sorted(pictures, key=natural_order)
-
-
-def natural_order(path: Path) -> list[tuple[int, str]]:
-    """A key for sorting: `frame2` comes before `frame10`."""
-    return [
-        (int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", path.name.lower())
-    ]
+    """The still pictures of a folder."""
+    return [child for child in children(folder) if child.is_file() and kind_of(child) == "picture"]
 
 
 def stream_array(path: Path) -> Iterator[TimedFrame]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from bootifol.demos.contact_sheet import write_contact_sheet
-from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.demo_set import DemoSet, listed
 from bootifol.demos.lerobot import LeRobotEpisode, lerobot_episodes
 from bootifol.demos.manifest import Manifest, Shard, VideoEntry, installed_versions, write_manifest
 from bootifol.demos.shards import (
@@ -23,9 +24,9 @@ from bootifol.demos.shards import (
     write_shard,
 )
 from bootifol.demos.upright import TimedFrame
-from bootifol.demos.video_files import frame_rate, is_lerobot_dataset, stream_video
+from bootifol.demos.video_files import frame_rate, is_lerobot_dataset, stream_video, video_paths
 from bootifol.envs.pictures import centered_square, resize
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, BootifolWarning, collected_warnings, warn
 from bootifol.files import remove_leftovers, written_aside
 from bootifol.locks import one_writer
 from bootifol.progress import progress
@@ -40,6 +41,8 @@ Crop = tuple[int, int, int]
 LONGEST_STILL = 20_000
 """Times that one picture of a file is taken in a row, at most: thirteen minutes at 25 a second. Damaged time stamps ask
 for any number."""
+_LONGEST_PICTURE = 3600.0
+"""Seconds; only damaged time stamps let one picture show for longer."""
 
 LARGEST_SQUARE = "largest centered square"
 """How a manifest names the crop that nobody chose."""
@@ -92,8 +95,8 @@ def import_videos(
     """Writes a demo set from video files; the set appears whole or not at all.
 
     Args:
-        files: video files, folders of pictures (each folder one video), .npy and .npz arrays, and LeRobot
-            datasets (each episode one video).
+        files: video files, folders of them or of the pictures of one video, .npy and .npz arrays, and LeRobot
+            datasets (each episode one video), as `video_paths` finds them.
         out: directory of the set; it must not exist.
         conversion: frame rate, length and size of the result.
         behavior: what the videos show.
@@ -102,7 +105,8 @@ def import_videos(
 
     Raises:
         BootifolError: `out` exists, files are empty, damaged or truncated (all such files are named), or the
-            camera is unclear.
+            camera is unclear. What was left out, or taken one way where another was possible, is a `BootifolWarning`,
+            and stands in the manifest beside the file.
     """
     conversion = conversion or Conversion()
     out = Path(out)
@@ -111,7 +115,7 @@ def import_videos(
     if not files:
         raise BootifolError("there are no videos to import: name files, or folders of pictures")
     name = name or f"{out.resolve().parent.name}-{behavior}"
-    sources = _sources(files, camera)
+    sources = _sources(video_paths(files), camera)
     with one_writer(out, out.parent / f".{out.name}.lock"):
         remove_leftovers(out.parent, out)
         if out.exists():
@@ -145,9 +149,9 @@ def read_recordings(
     Raises:
         BootifolError: as `import_videos`.
     """
-    for source in _sources([path], camera if is_lerobot_dataset(path) else None):
+    for source in _sources(video_paths([path]), camera if is_lerobot_dataset(path) else None):
         rate = frames_per_second if _rate(source) else None
-        name = f"{path} episode {source.index}" if isinstance(source, LeRobotEpisode) else str(path)
+        name = f"{path} episode {source.index}" if isinstance(source, LeRobotEpisode) else str(source)
         for frames in convert(source, Conversion(sys.maxsize, size, crop, rate)):
             yield name, frames
 
@@ -219,39 +223,74 @@ def _resampled(source: Source, frames_per_second: float | None) -> Iterator[Fram
     if frames_per_second is None:
         yield from (timed.frame for timed in _stream(source))
         return
-    showing: Frame | None = None
+    showing: TimedFrame | None = None
     since = gap = 0.0
     emitted = 0
     for timed in _stream(source):
         seconds = _seconds(source, timed)
         if showing is not None:
             gap = seconds - since
-            if _instants_before(seconds, frames_per_second) - emitted > LONGEST_STILL:
+            if gap < 0:
+                raise BootifolError(
+                    f"{source}: its times run backward at {since:.2f} s, so nobody can say which picture shows when: "
+                    "import it without --fps, which keeps every picture, or save it anew with another program"
+                )
+            instants = _instants_before(source, seconds, gap, timed.tick, frames_per_second)
+            if instants - emitted > LONGEST_STILL:
                 raise BootifolError(
                     f"{source} shows one picture for {gap:,.0f} s, {frames_per_second:g} times a second: its times "
                     "are damaged, or the rate is too high; export it again, or import it without --fps"
                 )
-            for _ in range(emitted, _instants_before(seconds, frames_per_second)):
-                yield showing
+            for _ in range(emitted, instants):
+                yield showing.frame
                 emitted += 1
-        showing, since = timed.frame, seconds
-    if showing is not None:  # the last picture shows as long as the one before it did
-        for _ in range(emitted, max(1, _instants_before(since + gap, frames_per_second))):
-            yield showing
+        showing, since = timed, seconds
+    if showing is not None:
+        # Where the file does not say, the last picture shows as long as the one before it did.
+        lasts = gap if showing.lasts is None else showing.lasts
+        instants = max(1, _instants_before(source, since + lasts, lasts, showing.tick, frames_per_second))
+        # At a file's own rate a duration that is a tick too short must not lose the picture.
+        own_rate = showing.tick > 0 and lasts * frames_per_second > 0.75
+        if own_rate and emitted / frames_per_second < since + lasts + showing.tick:
+            instants = max(instants, emitted + 1)
+        for _ in range(emitted, instants):
+            yield showing.frame
 
 
-def _instants_before(seconds: float, frames_per_second: float) -> int:
-    """How many of 0, 1/fps, 2/fps … lie before a time; half a millisecond absorbs rounded time stamps."""
-    return max(0, math.ceil((seconds - 0.0005) * frames_per_second))
+def _instants_before(source: Source, seconds: float, gap: float, tick: float, rate: float) -> int:
+    """How many of 0, 1/fps, 2/fps … lie before a time, up to what rounded time stamps are off by.
+
+    Args:
+        source: for the sentence.
+        seconds: the time.
+        gap: how long a picture has shown until then.
+        tick: what the file's times are off by.
+        rate: fps.
+    """
+    if gap > _LONGEST_PICTURE:
+        raise BootifolError(
+            f"{source}: one picture shows for {gap / 3600:.1f} hours; trim the file, or import it without --fps"
+        )
+    tolerance = min(max(tick, 0.0005), 0.4 * gap)
+    return max(0, math.ceil((seconds - tolerance) * rate))
 
 
 def _seconds(source: Source, timed: TimedFrame) -> float:
     if timed.seconds is None:
         raise BootifolError(
-            f"{source} has no times to resample by (only video files do): import it without --fps, and with --frames "
-            "instead of --task"
+            f"{source} has no times to resample by (pictures, arrays and raw streams have none): import it without "
+            "--fps, and with --frames instead of --task"
         )
     return timed.seconds
+
+
+def _tell(notes: Sequence[BootifolWarning]) -> None:
+    """Says once what is true of many files."""
+    files: dict[str, list[str]] = defaultdict(list)
+    for note in notes:
+        files[note.what].append(str(note.where))
+    for what, where in files.items():
+        warn(f"{listed(where)}: {what}")
 
 
 def _write_set(
@@ -263,26 +302,34 @@ def _write_set(
     entries: list[VideoEntry] = []
     waiting: list[Frames] = []
     problems: list[str] = []
+    notes: list[BootifolWarning] = []
     with progress("importing", total=len(sources)) as advance:
         for source in sources:
-            try:
-                for window, frames in enumerate(convert(source, conversion)):
-                    padded = last_frame_held(frames, conversion.frames)
-                    entries.append(
-                        VideoEntry(
-                            name=f"{name}-{len(entries):06d}",
-                            source=_described(source) | {"first_frame": window * conversion.frames},
-                            length=len(frames),
-                            sha256=sha256_of_frames(padded),
+            before = len(entries)
+            with collected_warnings() as told:
+                try:
+                    for window, frames in enumerate(convert(source, conversion)):
+                        padded = last_frame_held(frames, conversion.frames)
+                        entries.append(
+                            VideoEntry(
+                                name=f"{name}-{len(entries):06d}",
+                                source=_described(source) | {"first_frame": window * conversion.frames},
+                                length=len(frames),
+                                sha256=sha256_of_frames(padded),
+                            )
                         )
-                    )
-                    waiting.append(padded)
-                    if len(waiting) == per_shard:
-                        shards.append(write_shard(directory, len(shards), np.stack(waiting)))
-                        waiting = []
-            except BootifolError as error:
-                problems.append(str(error))
+                        waiting.append(padded)
+                        if len(waiting) == per_shard:
+                            shards.append(write_shard(directory, len(shards), np.stack(waiting)))
+                            waiting = []
+                except BootifolError as error:
+                    problems.append(str(error))
+            if told:
+                for entry in entries[before:]:
+                    entry.source["notes"] = [note.what for note in told]
+            notes += told
             advance(videos=str(len(entries)))
+    _tell(notes)
     if problems:
         raise BootifolError("\n".join(problems))
     if waiting:

@@ -12,12 +12,17 @@ from __future__ import annotations
 import os
 import re
 import string
+from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from bootifol.demos.decoding import stream_part
+import numpy as np
+
+from bootifol.demos.decoding import shown_at, stream_part
+from bootifol.demos.kinds import refuse_stand_in
+from bootifol.demos.litter import is_litter
 from bootifol.demos.upright import TimedFrame
 from bootifol.demos.video_files import is_lerobot_dataset
 from bootifol.errors import BootifolError
@@ -25,6 +30,9 @@ from bootifol.files import read_json
 
 INFO_PATH = "meta/info.json"
 EPISODES_DIRECTORY = "meta/episodes"
+
+OFF_THE_GRID = 0.25
+"""Frames by which an episode's beginning may differ from a picture's."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +48,18 @@ class LeRobotEpisode:
 
     file: Path
     first_seconds: float
-    """When the episode's first frame appears in the file."""
+    """When the episode's first frame appears in the file, as the dataset says; it may drift."""
 
     length: int
     """Frames of the episode."""
 
     frames_per_second: float
+
+    position: int = 0
+    """Frames of the episodes before this one in its file."""
+
+    frames_of_file: int | None = None
+    """Frames of all episodes in its file; None: the file may hold others."""
 
     def stream(self) -> Iterator[TimedFrame]:
         """The episode's pictures, decoded one by one.
@@ -53,12 +67,10 @@ class LeRobotEpisode:
         Raises:
             BootifolError: the file is damaged, or does not hold as many pictures as the dataset promises.
         """
-        half_a_frame = 0.5 / self.frames_per_second
-        start = self.first_seconds - half_a_frame
-        end = start + self.length / self.frames_per_second
         count = 0
         try:
-            for timed in stream_part(self.file, start, end):
+            refuse_stand_in(self.file)
+            for timed in stream_part(self.file, *self._span()):
                 count += 1
                 yield timed
         except BootifolError as error:
@@ -68,6 +80,31 @@ class LeRobotEpisode:
                 f"episode {self.index} of {self.dataset} should have {self.length} frames and {self.file} holds "
                 f"{count} of it: copy or export the dataset again"
             )
+
+    def _span(self) -> tuple[float, float]:
+        """From when until before when the episode's pictures appear in the file, in seconds.
+
+        Where the file holds the pictures of its episodes and no others, they are counted. Otherwise the dataset's times
+        must be those of the file's pictures.
+        """
+        half_a_frame = 0.5 / self.frames_per_second
+        shown = shown_at(self.file)
+        first = self.position
+        if len(shown) != self.frames_of_file:
+            nearest = int(np.abs(np.array(shown) - self.first_seconds).argmin()) if shown else 0
+            if not shown or self.first_seconds > shown[-1] + half_a_frame:
+                return self.first_seconds, self.first_seconds
+            off = abs(shown[nearest] - self.first_seconds) * self.frames_per_second
+            if off > OFF_THE_GRID:
+                raise BootifolError(
+                    f"it should begin at {self.first_seconds:.3f} s of {self.file}, where no picture begins (the "
+                    f"nearest is at {shown[nearest]:.3f} s), and the file holds {len(shown)} pictures where its "
+                    f"episodes have {self.frames_of_file}: export the dataset again"
+                )
+            first = nearest
+        last = first + self.length
+        end = shown[last] - half_a_frame / 2 if last < len(shown) else shown[-1] + half_a_frame
+        return shown[first] - half_a_frame / 2, end
 
 
 def lerobot_episodes(dataset: Path, camera: str | None = None) -> list[LeRobotEpisode]:
@@ -102,7 +139,22 @@ def lerobot_episodes(dataset: Path, camera: str | None = None) -> list[LeRobotEp
                 f"{file} is missing, and with it {len(missing)} episodes from number {missing[0]} on: copy or "
                 "download the whole dataset again"
             )
-    return episodes
+    return _placed(episodes)
+
+
+def _placed(episodes: list[LeRobotEpisode]) -> list[LeRobotEpisode]:
+    """The episodes with their positions in their files, in which they lie in order."""
+    placed: dict[int, LeRobotEpisode] = {}
+    files: dict[Path, list[LeRobotEpisode]] = defaultdict(list)
+    for episode in episodes:
+        files[episode.file].append(episode)
+    for inside in files.values():
+        total = sum(episode.length for episode in inside)
+        position = 0
+        for episode in sorted(inside, key=lambda episode: (episode.first_seconds, episode.index)):
+            placed[episode.index] = replace(episode, position=position, frames_of_file=total)
+            position += episode.length
+    return [placed[episode.index] for episode in episodes]
 
 
 def parquet_library() -> Any:
@@ -124,6 +176,7 @@ def parquet_library() -> Any:
 def _read_info(dataset: Path) -> dict[str, Any]:
     if not is_lerobot_dataset(dataset):
         raise BootifolError(f"{dataset} is no LeRobot dataset: there is no {INFO_PATH} in it")
+    refuse_stand_in(dataset / INFO_PATH)
     info = read_json(dataset / INFO_PATH, "the LeRobot dataset's description")
     version = info.get("codebase_version") if isinstance(info, dict) else None
     if not isinstance(version, str):
@@ -197,7 +250,11 @@ def _read_rows(dataset: Path, camera: str) -> list[_Row]:
     parquet = parquet_library()
     import pyarrow
 
-    files = [file for file in sorted((dataset / EPISODES_DIRECTORY).glob("*/*.parquet")) if file.is_file()]
+    files = sorted(
+        file
+        for file in (dataset / EPISODES_DIRECTORY).glob("*/*.parquet")
+        if file.is_file() and not is_litter(file)
+    )
     if not files:
         raise BootifolError(
             f"{dataset / EPISODES_DIRECTORY} holds no parquet files, which say where each episode begins: copy or "
@@ -213,6 +270,7 @@ def _read_rows(dataset: Path, camera: str) -> list[_Row]:
     ]
     rows = []
     for file in files:
+        refuse_stand_in(file)
         try:
             table = parquet.ParquetFile(file).read(use_threads=False)
             missing = [column for column in columns if column not in table.column_names]

@@ -45,12 +45,23 @@ class VideoEntry:
 
     name: str
     source: dict[str, Any]
-    """Where it comes from: `{"behavior", "seed"}` when recorded, `{"file", "first_frame"}` when imported (and
-    `"episode"`, `"camera"` when the file is a LeRobot dataset)."""
+    """Where it comes from: `{"behavior", "seed"}` when recorded, `{"file", "first_frame"}` when imported, with
+    `"episode"` and `"camera"` when the file is a LeRobot dataset, and `"notes"` where there was a choice how to read
+    it."""
     length: int
     """Frames that were seen. A shorter video stands still on its last frame until the set's length."""
     sha256: str
     """Of its pixels `[T + 1, H, W, 3]` in memory order."""
+
+    @property
+    def described(self) -> str:
+        """The video's name, and for imported ones where to find it."""
+        if "file" not in self.source:
+            return self.name
+        episode = f" episode {self.source['episode']}" if "episode" in self.source else ""
+        start = self.source.get("first_frame")
+        window = f" from frame {start} on" if start else ""
+        return f"{self.name} ({self.source['file']}{episode}{window})"
 
 
 @dataclass(frozen=True)

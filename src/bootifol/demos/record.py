@@ -30,6 +30,7 @@ from bootifol.demos.manifest import (
     read_manifest,
     write_manifest,
 )
+from bootifol.demos.own_policy import own_policy
 from bootifol.demos.shards import (
     last_frame_held,
     sha256_of_file,
@@ -46,7 +47,7 @@ from bootifol.files import remove_leftovers
 from bootifol.locks import NAME as LOCK
 from bootifol.locks import one_writer
 from bootifol.progress import progress
-from bootifol.tasks import Task, make_environment, task_named
+from bootifol.tasks import make_environment, task_named
 from bootifol.types import Frames
 
 
@@ -61,6 +62,8 @@ class Recording:
     seed: int
     episode_steps: int
     action_repeat: int
+    policy: str | None = None
+    """The user's own `MODULE:FUNCTION` who plays the expert; None for the bundled one."""
 
     def video_seed(self, index: int) -> int:
         """The seed of one video, below 2^31.
@@ -88,6 +91,7 @@ def record_demos(
     episode_steps: int | None = None,
     workers: int = 1,
     action_repeat: int | None = None,
+    policy: str | None = None,
 ) -> dict[Behavior, DemoSet]:
     """Records everything a run learns from, one demo set a behavior: `out/expert`, `out/random`, `out/half_good`.
 
@@ -102,6 +106,7 @@ def record_demos(
         episode_steps: agent steps of a video; the task's training episode by default.
         workers: processes that play episodes.
         action_repeat: simulator steps an agent step; the task's own by default.
+        policy: as of `record`.
 
     Raises:
         BootifolError: as `record`.
@@ -110,6 +115,8 @@ def record_demos(
     performing: Sequence[Behavior]
     if behaviors is None:
         performing = ("expert", "random", "half_good") if has_expert else ("random",)
+        if policy is not None:
+            performing = ("expert", "random")
     else:
         performing = [behavior for behavior in behaviors if has_expert or behavior != "half_good"]
     pictures = pictures or PictureConfig(agent_size=64, video_size=64)
@@ -124,6 +131,7 @@ def record_demos(
             episode_steps,
             workers,
             action_repeat,
+            policy if behavior == "expert" else None,
         )
         for behavior in performing
     }
@@ -139,6 +147,7 @@ def record(
     episode_steps: int | None = None,
     workers: int = 1,
     action_repeat: int | None = None,
+    policy: str | None = None,
 ) -> DemoSet:
     """Records a demo set, or goes on with one that was interrupted.
 
@@ -155,6 +164,7 @@ def record(
         episode_steps: agent steps of a video (T), the task's training episode by default.
         workers: processes that play episodes; 1 plays them in this one.
         action_repeat: simulator steps an agent step; the task's own by default.
+        policy: who plays the expert in a Gymnasium environment, as of `own_policy`.
 
     Raises:
         BootifolError: another set is there already, the disk is too small, or a name is unknown.
@@ -169,31 +179,23 @@ def record(
             f"there is no behavior '{behavior}'; choose among {', '.join(get_args(Behavior))}"
         )
     performed = task_named(task, action_repeat, episode_steps)
-    if behavior in ("expert", "half_good") and not performed.has_expert:
+    if behavior in ("expert", "half_good") and not performed.has_expert and policy is None:
         raise BootifolError(
-            f"no expert is bundled for {task}: import videos of it with `bootifol demos import`, and record "
-            "the other behaviors with `--behaviors random`"
+            f"no expert is bundled for {task}: let a function of yours play it with `--policy MODULE:FUNCTION`, or "
+            "import videos with `bootifol demos import` and record the other behaviors with `--behaviors random`"
         )
     out = Path(out)
+    plan = Recording(
+        task, behavior, episodes, pictures, seed, performed.episode_steps, performed.action_repeat, policy
+    )
     only_read = (out / MANIFEST_NAME).exists() and not os.access(out, os.W_OK)
     with nullcontext() if only_read else one_writer(out):
         remove_leftovers(out)
-        return _record(out, performed, behavior, episodes, pictures, seed, workers)
+        return _record(out, plan, workers)
 
 
-def _record(
-    out: Path,
-    performed: Task,
-    behavior: Behavior,
-    episodes: int,
-    pictures: PictureConfig,
-    seed: int,
-    workers: int,
-) -> DemoSet:
-    task = performed.name
-    plan = Recording(
-        task, behavior, episodes, pictures, seed, performed.episode_steps, performed.action_repeat
-    )
+def _record(out: Path, plan: Recording, workers: int) -> DemoSet:
+    episodes = plan.episodes
     manifest = _begin(out, plan)
     per_shard = videos_per_shard(episodes, manifest.video_bytes)
     finished = _whole_shards(out, manifest)
@@ -224,7 +226,10 @@ def play(plan: Recording, index: int) -> Frames:
     """One video of the set, uint8 `[n, H, W, 3]` with `n` at most T + 1; the same in any process."""
     environment = _environment(plan.task, plan.pictures, plan.episode_steps, plan.action_repeat)
     seed = plan.video_seed(index)
-    act = make_behavior(plan.behavior, plan.task, environment, seed)
+    if plan.policy is not None:
+        act = own_policy(plan.policy, environment)
+    else:
+        act = make_behavior(plan.behavior, plan.task, environment, seed)
     return play_episode(environment, act, seed, name="recorded").episode.video.frames
 
 
@@ -239,6 +244,8 @@ def _environment(
 def _begin(out: Path, plan: Recording) -> Manifest:
     """The manifest to go on with: that of the recording in `out`, or a new one without videos."""
     environment = _environment(plan.task, plan.pictures, plan.episode_steps, plan.action_repeat)
+    if plan.policy is not None:
+        own_policy(plan.policy, environment)  # refused before anything is written
     new = Manifest(
         name=f"{plan.task}-{plan.behavior}",
         complete=False,
@@ -274,6 +281,11 @@ def _begin(out: Path, plan: Recording) -> Manifest:
                 f"{out} holds another demo set (its {field.name} is {old!r}, not {wanted!r}): "
                 "choose another directory or remove it"
             )
+    players = {entry.source.get("policy") for entry in there.videos} - {plan.policy}
+    if players:
+        raise BootifolError(
+            f"{out} was played by {players.pop() or 'the bundled expert'}: choose another directory"
+        )
     return there
 
 
@@ -304,7 +316,8 @@ def _with_shards(manifest: Manifest, finished: dict[int, tuple[Shard, Sequence[V
 def _entry(plan: Recording, manifest: Manifest, index: int, length: int, frames: Frames) -> VideoEntry:
     return VideoEntry(
         name=f"{manifest.name}-{index:06d}",
-        source={"behavior": plan.behavior, "seed": plan.video_seed(index)},
+        source={"behavior": plan.behavior, "seed": plan.video_seed(index)}
+        | ({} if plan.policy is None else {"policy": plan.policy}),
         length=length,
         sha256=sha256_of_frames(frames),
     )

@@ -12,10 +12,19 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.wrappers import TimeLimit
+from numpy.typing import NDArray
 
 from bootifol.envs.camera import prepare_opengl
+from bootifol.envs.other_answers import (
+    Environment,
+    one_number,
+    seeded,
+    success_of,
+    told_as_a_sentence,
+    with_todays_answers,
+)
 from bootifol.envs.pictures import PictureConfig, centered_square, is_picture, told_kind
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, warn
 from bootifol.own_modules import allow, is_own_name, own_callable, told, where
 from bootifol.types import Action, Frame
 
@@ -27,7 +36,11 @@ ASSUMED_STEP_SECONDS = 1.0 / 25.0
 
 SUPPORTED = "bootifol acts with continuous actions: one gymnasium.spaces.Box of floats with finite bounds"
 
-Environment = gymnasium.Env[Any, Any]
+LOOKED_AT_STEPS = 10
+"""Steps of random actions until an environment must have drawn something."""
+
+SAME_START_LEVELS = 8
+"""Levels of 255 by which a pixel may differ between two starts with one seed: renderers are rarely exact."""
 
 _open_simulators: weakref.WeakSet[GymnasiumSimulator] = weakref.WeakSet()
 
@@ -45,17 +58,20 @@ class GymnasiumSimulator:
 
     def __init__(self, name: str, pictures: PictureConfig) -> None:
         self.name = name
-        self.environment, self.time_limit = without_time_limit(make(name))
+        made, self.time_limit = without_time_limit(make(name))
+        self.environment = with_todays_answers(made)
         """Without the environment's own time limit, which is kept here in steps (None: it has none)."""
         space = _action_space(name, self.environment)
         _require_pictures(name, self.environment)
         self.action_dim = int(np.prod(space.shape))
-        self._shape, self._dtype = space.shape, space.dtype
+        self.action_shape, self._dtype = space.shape, space.dtype
         self._low, self._high = space.low.astype(np.float64), space.high.astype(np.float64)
         seconds = step_seconds(self.environment)
         self.knows_time = seconds is not None
         self.step_seconds = ASSUMED_STEP_SECONDS if seconds is None else seconds
         self.truncated = False
+        self.observation: Any = None
+        """What the environment itself observed last, for a policy of the user's; no learner reads it."""
         self._size = pictures.picture_size
         # What cannot be shown is refused here, before anyone has written a file.
         self.reset(seed=0)
@@ -63,15 +79,56 @@ class GymnasiumSimulator:
 
     def reset(self, seed: int) -> None:
         self.truncated = False
-        self.environment.reset(seed=seed)
+        with told_as_a_sentence(self.name, "reset()"), seeded(self.environment, seed):
+            self.observation, _ = self.environment.reset(seed=seed)
 
     def step(self, action: Action) -> tuple[float, bool, bool | None]:
-        part = (np.asarray(action, np.float64).reshape(self._shape) + 1.0) / 2.0
+        part = (np.asarray(action, np.float64).reshape(self.action_shape) + 1.0) / 2.0
         scaled = (self._low + part * (self._high - self._low)).astype(self._dtype)
-        _, reward, terminated, truncated, info = self.environment.step(scaled)
-        self.truncated = bool(truncated)
-        success = info.get("is_success", info.get("success"))
-        return float(reward), bool(terminated), None if success is None else bool(success)
+        with told_as_a_sentence(self.name, "step()"):
+            self.observation, reward, terminated, truncated, info = self.environment.step(scaled)
+        self.truncated = bool(one_number(self.name, "truncated", truncated))
+        ended = bool(one_number(self.name, "terminated", terminated))
+        return one_number(self.name, "the reward", reward), ended, success_of(self.name, info)
+
+    def in_unit_range(self, action: NDArray[np.float64]) -> Action:
+        """An action between the environment's own bounds as `step` takes it, float32 `[A]` in [-1, 1]."""
+        part = (action - self._low) / np.maximum(self._high - self._low, 1e-12)
+        return (2.0 * part - 1.0).clip(-1.0, 1.0).astype(np.float32).reshape(-1)
+
+    def require_sights(self) -> None:
+        """Looks whether anything is drawn, and whether starts follow from their seed, of which it warns.
+
+        Raises:
+            BootifolError: every picture is of one color, or a step's answer cannot be used.
+        """
+        starts = []
+        for _ in range(2):
+            self.reset(seed=0)
+            starts.append(self.render().astype(np.int16))
+        if np.abs(starts[0] - starts[1]).max() > SAME_START_LEVELS:
+            warn(
+                f"{self.name} starts elsewhere when it is reset twice with one seed, so evaluations of it cannot be "
+                "compared: let its reset draw from self.np_random alone, after super().reset(seed=seed)"
+            )
+        seen, rng, over = starts[1], np.random.default_rng(0), False
+        for number in range(LOOKED_AT_STEPS):
+            # One step at least, for what it answers may be unfit, too.
+            if number > 0 and (np.ptp(seen, axis=(0, 1)) > 0).any():
+                return
+            if not over:
+                _, over, _ = self.step(rng.uniform(-1, 1, self.action_dim).astype(np.float32))
+            seen = self.render().astype(np.int16)
+        driver = os.environ.get("SDL_VIDEODRIVER")
+        hint = (
+            f"; SDL_VIDEODRIVER is {driver}, and some draw nothing then: unset it"
+            if driver == "dummy"
+            else ""
+        )
+        raise BootifolError(
+            f"{self.name} draws nothing: every picture is of one color, {told_color(seen)}, at its start and in "
+            f"{LOOKED_AT_STEPS} steps{hint}"
+        )
 
     def render(self) -> Frame:
         """The current state, uint8 `[P, P, 3]`: the largest centered square of what the environment renders.
@@ -151,11 +208,24 @@ def step_seconds(environment: Environment) -> float | None:
 
     `metadata["render_fps"]` goes before `dt`, since it is the speed at which Gymnasium's own tools write videos.
     """
-    rate = (environment.metadata or {}).get("render_fps")
-    if isinstance(rate, int | float) and rate > 0:
-        return 1.0 / float(rate)
-    seconds = getattr(environment.unwrapped, "dt", None)
-    return float(seconds) if isinstance(seconds, int | float) and seconds > 0 else None
+    rate = _positive((environment.metadata or {}).get("render_fps"))
+    return _positive(getattr(environment.unwrapped, "dt", None)) if rate is None else 1.0 / rate
+
+
+def told_color(picture: NDArray[np.int16]) -> str:
+    """The color of a picture's first pixel, for a sentence."""
+    red, green, blue = (int(level) for level in picture[0, 0])
+    names = {(0, 0, 0): "black", (255, 255, 255): "white"}
+    return names.get((red, green, blue), f"RGB {red}, {green}, {blue}")
+
+
+def _positive(value: Any) -> float | None:
+    """A number, of whatever kind numpy or Python has, if it is one above 0."""
+    try:
+        number = float(np.asarray(value, dtype=np.float64).reshape(()))
+    except (TypeError, ValueError):
+        return None
+    return number if 0 < number < np.inf else None
 
 
 def _registered(name: str) -> Environment:
@@ -246,7 +316,8 @@ def _prepare_rendering() -> None:
     prepare_opengl()
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     if sys.platform.startswith("linux") and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
-        os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+        # Not "dummy", with which some environments draw nothing (highway-env).
+        os.environ.setdefault("SDL_VIDEODRIVER", "offscreen")
 
 
 def _close_at_exit(simulator: GymnasiumSimulator) -> None:

@@ -256,7 +256,10 @@ def _return_tiles(run: RunFiles, final: FinalReturn) -> list[Tile]:
     episodes = f"{final.environment_return.count} episodes of {final.episode_steps} agent steps"
     levels = run.return_levels(final.episode_steps)
     against = (
-        episodes if levels is None else f"random {short_number(levels[0])}, expert {short_number(levels[1])}"
+        episodes
+        if levels is None
+        else f"in {final.episode_steps} agent steps; random {short_number(levels[0])}, expert "
+        f"{short_number(levels[1])}"
     )
     tiles = []
     if final.scaled_return is not None:
@@ -332,8 +335,12 @@ def _ranking_cards(run: RunFiles) -> list[Card]:
         cards += _card(
             when,
             plots.ranking_plot(moments[agent_steps]),
-            f"{numbers}A dot is one video the reward model never trained on. Healthy: expert right of half-good, "
-            "half-good right of random.",
+            f"{numbers}A dot is one video the reward model never trained on. "
+            + (
+                "Healthy: your videos (expert) right of random."
+                if scores is None
+                else "Healthy: expert right of half-good, half-good right of random."
+            ),
         )
     return cards
 
@@ -357,8 +364,12 @@ def _strip_cards(run: RunFiles) -> list[Card]:
             cards += _card(
                 f"Start {start + 1}",
                 reward_above_film_strip(videos),
-                "Each picture stands below its moment on the curve. Healthy: the expert's reward stays above random's, "
-                "and the agent's curve and pictures follow the expert's.",
+                "Each picture stands below its moment on the curve. Healthy: "
+                + (
+                    "the expert's reward stays above random's, and the agent's curve and pictures follow the expert's."
+                    if "expert" in videos
+                    else "the agent's reward stays above random's, and its pictures show what your videos show."
+                ),
             )
     return cards
 
@@ -385,7 +396,9 @@ def _video_rows(run: RunFiles) -> list[list[PlayedVideo]]:
                     kind=kind,
                     color=KIND_COLORS[kind],
                     source="data:video/mp4;base64," + base64.b64encode(path.read_bytes()).decode("ascii"),
-                    detail=f"return {shown.environment_return:.3g}" if shown is not None and known else "",
+                    detail=f"return {shown.environment_return:.3g} in {len(shown.rewards)} agent steps"
+                    if shown is not None and known
+                    else "",
                 )
             )
         rows.append(row)

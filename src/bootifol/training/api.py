@@ -12,6 +12,7 @@ from rich.console import Console
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.demos.import_videos import LARGEST_SQUARE, read_recordings
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
+from bootifol.demos.match_set import match_of
 from bootifol.demos.video_writing import write_video
 from bootifol.envs.rollout import PlayedEpisode
 from bootifol.errors import (
@@ -293,14 +294,16 @@ def _console() -> Console:
 
 
 def read_videos(path: Path, run: RunConfig) -> Iterator[Video]:
-    """The videos there, with the size, the crop and the pace of those that the run learned from."""
+    """The videos there, with size, crop, pace and looks of those that the run learned from."""
     if (path / MANIFEST_NAME).is_file():
         demo_set = DemoSet.open(path)
         yield from map(demo_set.__getitem__, range(len(demo_set)))
         return
-    expert = read_manifest(find_demo_sets(run.demos)["expert"])
+    directory = find_demo_sets(run.demos)["expert"]
+    expert = read_manifest(directory)
+    matched = match_of(directory, expert)
     size, camera = run.training.pictures.video_size, expert.videos[0].source.get("camera")
     crop = (expert.conversion or {}).get("crop", LARGEST_SQUARE)
     chosen = None if crop == LARGEST_SQUARE else tuple(crop)
     for name, frames in read_recordings(path, size, expert.frames_per_second, camera, chosen):
-        yield Video(name, frames)
+        yield Video(name, matched(frames))
