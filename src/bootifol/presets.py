@@ -236,12 +236,8 @@ def _seeing(pixels: TrainingConfig, frames: FrameConfig, **agent: Any) -> Traini
             critic_norm=True,
             feature_dim=64,
             precision="fp32",
-            cloning_weight=0.0,
-            ema_decay=0.0,
-            exploration_start=1.0,
             **agent,
         ),
-        demonstrations=DemonstrationConfig(),
     )
 
 
@@ -251,18 +247,19 @@ CPU = _seeing(
     hidden_dim=256,
     batch_size=256,
     learning_rate=3e-4,
-    exploration_steps=30_000,
+    cloning_weight=1.0,
     replay_capacity=300_000,
 )
 CPU = replace(
     CPU,
     alignment=AlignmentConfig(gradient_steps=900),
     interactive=InteractiveConfig(
-        agent_steps=300_000, reward_update_every=8, reward_updates_until=300_000, agent_videos=1000
+        agent_steps=200_000, reward_update_every=8, reward_updates_until=200_000, agent_videos=1000
     ),
     evaluation=EvaluationConfig(every=20_000, long_episodes=5, final_episodes=50),
 )
-"""BootIfOL with a reward from single frames, and an agent that reads what its eyes make of them: nothing is cloned."""
+"""BootIfOL with a reward from single frames, and an agent that reads what its eyes make of them and starts as a clone
+of the videos; about an hour of one core."""
 
 LONG = replace(
     CPU,
@@ -274,13 +271,14 @@ LONG = replace(
 
 DEMO = replace(
     CPU,
-    interactive=replace(CPU.interactive, agent_steps=60_000, reward_updates_until=60_000),
+    interactive=replace(CPU.interactive, agent_steps=20_000, reward_updates_until=20_000),
+    demonstrations=replace(CPU.demonstrations, phases=2),
     evaluation=EvaluationConfig(every=10_000, long_episodes=2, final_episodes=10),
     checkpoint_minutes=5.0,
 )
 """For `make demo`: `cpu` in minutes."""
 
-DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(), exploration_steps=6000, batch_size=64)
+DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(), exploration_steps=6000, replay_capacity=20_000)
 DRAWN = replace(
     DRAWN,
     alignment=AlignmentConfig(gradient_steps=600, time_share=0.25),

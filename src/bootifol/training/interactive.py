@@ -214,6 +214,10 @@ class InteractivePhase:
     def _update_reward(self) -> None:
         if self._warming_up or self.counters.agent_steps % self.config.reward_update_every:
             return
+        if self.augmentation is not None and isinstance(self.reward_model, SeesFrames):
+            # Videos from files: the head would learn to tell their compression from the agent's clean pictures, and its
+            # eyes, which saw them in many looks, rest already.
+            return
         resting = self.budget.scheduled_steps(self.counters) > self.config.reward_updates_until
         if resting and not self.reward_model.keeps_learning:
             return

@@ -135,6 +135,11 @@ class BootifolConfig:
                 f"bootifol: {', '.join(f'{loss}_weight' for loss in learned)} are all 0, so nothing would be learned; "
                 "give one of them"
             )
+        if self.reward == "frames" and self.backbone is not None:
+            raise BootifolError(
+                "bootifol: reward frames has eyes of its own and reads no backbone; leave one of them out, or take "
+                "reward distance and an agent that reads pictures, as --preset cpu_pixels does"
+            )
         if self.videos_per_class < 2:
             raise BootifolError(
                 f"bootifol: videos_per_class is {self.videos_per_class}, but L_O compares an expert video "
