@@ -218,8 +218,9 @@ def _with_act(number: int, act: Callable[[], None], work: Callable[[], object]) 
 
 def full_disk(attack: Attack, tries: int) -> tuple[int, int]:
     """No space left at one write after another: a sentence, and the run goes on when there is space again."""
+    counted = attack.new_place("counted")
     with at_call(0, lambda: None) as calls:
-        train(attack, attack.new_place("counted"))
+        train(attack, counted)
     writes = [
         number for number, name in enumerate(calls, start=1) if name != "rmtree"
     ]  # which needs no space
