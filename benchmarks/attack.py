@@ -31,7 +31,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 from benchmarks.command import command
 from benchmarks.fuzz_run_files import files_of, fuzz, opened
-from benchmarks.rows import write_rows
+from benchmarks.rows import read_rows, write_rows
 from bootifol import checksums, files, tracking
 from bootifol.agents.policy import read_policy
 from bootifol.cli.main import main as bootifol
@@ -218,8 +218,9 @@ def _with_act(number: int, act: Callable[[], None], work: Callable[[], object]) 
 
 def full_disk(attack: Attack, tries: int) -> tuple[int, int]:
     """No space left at one write after another: a sentence, and the run goes on when there is space again."""
+    counted = attack.new_place("counted")
     with at_call(0, lambda: None) as calls:
-        train(attack, attack.new_place("counted"))
+        train(attack, counted)
     writes = [
         number for number, name in enumerate(calls, start=1) if name != "rmtree"
     ]  # which needs no space
@@ -416,22 +417,27 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("results/attack.csv"))
     parser.add_argument("--share", type=float, default=1.0, help="of the tries, for a quick look")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--only", nargs="+", default=[], help="words of the promises to try; the table's other rows stay"
+    )
     arguments = parser.parse_args()
     directory = Path(tempfile.mkdtemp())
-    rows = []
+    rows = {row["promise"]: row for row in read_rows(arguments.out, COLUMNS)}
     try:
         demos, whole = record_demos(directory / "demos"), directory / "whole"
         attack = Attack(directory, demos, whole, np.random.default_rng(arguments.seed))
         train(attack, whole)
         for promise, (run, tries) in ATTACKS.items():
+            if arguments.only and not any(word in promise for word in arguments.only):
+                continue
             done, held = run(attack, max(1, round(arguments.share * tries)))
-            rows.append({"promise": promise, "tries": str(done), "held": str(held)})
+            rows[promise] = {"promise": promise, "tries": str(done), "held": str(held)}
+            write_rows(arguments.out, COLUMNS, [rows[name] for name in ATTACKS if name in rows])
             print(f"{promise}: {held} of {done}", flush=True)
     finally:
         shutil.rmtree(directory)
-    write_rows(arguments.out, COLUMNS, rows)
-    print(markdown_table(list(COLUMNS), [[row[column] for column in COLUMNS] for row in rows]))
-    return 0 if all(row["tries"] == row["held"] for row in rows) else 1
+    print(markdown_table(list(COLUMNS), [[row[column] for column in COLUMNS] for row in rows.values()]))
+    return 0 if all(row["tries"] == row["held"] for row in rows.values()) else 1
 
 
 if __name__ == "__main__":
