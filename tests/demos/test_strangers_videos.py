@@ -13,8 +13,8 @@ from PIL import Image
 from bootifol.cli.main import main
 from bootifol.demos import folders_and_arrays, import_videos
 from bootifol.demos.demo_set import DemoSet
-from bootifol.demos.folders_and_arrays import natural_order
 from bootifol.demos.lerobot import _is_harmless
+from bootifol.demos.picture_order import natural_order
 from bootifol.demos.upright import TimedFrame
 from bootifol.demos.video_files import stream_video
 from bootifol.errors import BootifolError

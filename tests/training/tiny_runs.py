@@ -53,7 +53,7 @@ TINY = replace(
         log_every=60,
     ),
     demonstrations=DemonstrationConfig(),
-    evaluation=replace(SMOKE.evaluation, every=120, held_out_videos=2),
+    evaluation=replace(SMOKE.evaluation, every=120, held_out_videos=2, sight_episodes=0),
 )
 
 WITH_DEMONSTRATIONS = replace(
@@ -88,6 +88,7 @@ SEEING = replace(
     ),
     agent=replace(WITH_DEMONSTRATIONS.agent, observations="states", critic_norm=True, ema_decay=0.9),
     interactive=replace(TINY.interactive, relabel_every=2),
+    evaluation=replace(TINY.evaluation, sight_episodes=1),
 )
 """The same with a reward from single frames and an agent that reads states."""
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from bootifol.demos.kinds import kind_of, refuse_stand_in
+from bootifol.demos.kinds import PICTURE_SUFFIXES, kind_of, refuse_stand_in
 from bootifol.demos.litter import children
 from bootifol.demos.picture_order import in_order
 from bootifol.demos.shards import DAMAGED_ARRAY
@@ -52,8 +52,14 @@ def stream_folder(path: Path) -> Iterator[TimedFrame]:
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """The still pictures of a folder."""
-    return [child for child in children(folder) if child.is_file() and kind_of(child) == "picture"]
+    """The still pictures of a folder; also what is named like one and is no file, which nothing may open."""
+    return [child for child in children(folder) if _is_picture(child)]
+
+
+def _is_picture(path: Path) -> bool:
+    if path.is_file():
+        return kind_of(path) == "picture"
+    return not path.is_dir() and path.suffix.lower() in PICTURE_SUFFIXES
 
 
 def stream_array(path: Path) -> Iterator[TimedFrame]:

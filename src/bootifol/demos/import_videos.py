@@ -41,8 +41,6 @@ Crop = tuple[int, int, int]
 LONGEST_STILL = 20_000
 """Times that one picture of a file is taken in a row, at most: thirteen minutes at 25 a second. Damaged time stamps ask
 for any number."""
-_LONGEST_PICTURE = 3600.0
-"""Seconds; only damaged time stamps let one picture show for longer."""
 
 LARGEST_SQUARE = "largest centered square"
 """How a manifest names the crop that nobody chose."""
@@ -236,11 +234,6 @@ def _resampled(source: Source, frames_per_second: float | None) -> Iterator[Fram
                     "import it without --fps, which keeps every picture, or save it anew with another program"
                 )
             instants = _instants_before(source, seconds, gap, timed.tick, frames_per_second)
-            if instants - emitted > LONGEST_STILL:
-                raise BootifolError(
-                    f"{source} shows one picture for {gap:,.0f} s, {frames_per_second:g} times a second: its times "
-                    "are damaged, or the rate is too high; export it again, or import it without --fps"
-                )
             for _ in range(emitted, instants):
                 yield showing.frame
                 emitted += 1
@@ -267,9 +260,10 @@ def _instants_before(source: Source, seconds: float, gap: float, tick: float, ra
         tick: what the file's times are off by.
         rate: fps.
     """
-    if gap > _LONGEST_PICTURE:
+    if gap * rate > LONGEST_STILL:
         raise BootifolError(
-            f"{source}: one picture shows for {gap / 3600:.1f} hours; trim the file, or import it without --fps"
+            f"{source} shows one picture for {gap:,.0f} s, {rate:g} times a second: its times are damaged, or the rate "
+            "is too high; trim it or export it again, or import it without --fps"
         )
     tolerance = min(max(tick, 0.0005), 0.4 * gap)
     return max(0, math.ceil((seconds - tolerance) * rate))

@@ -165,7 +165,7 @@ class Demonstrations:
         """Gives a video the actions and rewards that inverse dynamics and reward model now see in it."""
         video = self._video(index)
         rewards = reward_model.label(video, draw_references(reward_model, self.expert, rng))
-        frames = self._at_agent_size(video) if video.features is None else cast(FrameStates, video.features)
+        frames = self._at_agent_size(video) if self.featurizer is None else cast(FrameStates, video.features)
         actions = self.inverse_dynamics.actions(frames)
         self.replay.relabel(self.replay.episode_ids[index], rewards, actions)
 

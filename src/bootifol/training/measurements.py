@@ -152,6 +152,7 @@ class Measurements:
             count = self._config.held_out_videos
             videos["agent"] = agent_videos.newest(count)
         sees = self._sight()
+        figures = {f"sight/{name}": value for name, value in sees.items()}
         rows = rank_videos(
             self._components.reward_model,
             {kind: self._one_by_one(of_kind) for kind, of_kind in videos.items()},
@@ -162,40 +163,36 @@ class Measurements:
         append_ranking(self._directory / "ranking.csv", rows)
         if all(kind in videos for kind in KINDS):
             scores = ranking_scores(rows)
-            self._log(self._counters.agent_steps, scores.metrics())
-            if sees:
-                return
-            self._console.print(
+            self._log(self._counters.agent_steps, {**scores.metrics(), **figures})
+            of_videos = (
                 f"the learned reward on held-out videos: Kendall's tau {scores.kendall_tau:.2f} (a perfect order has "
                 f"{scores.perfect_tau:.2f}), expert above half-good {scores.expert_above_half_good:.0%}, half-good "
                 f"above random {scores.half_good_above_random:.0%}"
             )
+            self._console.print(in_words(sees) if sees else of_videos)
         elif {"expert", "random"} <= videos.keys():
             above = expert_above_random(rows)
-            self._log(self._counters.agent_steps, {EXPERT_ABOVE_RANDOM: above})
-            if sees:
-                return
-            self._console.print(f"the learned reward on held-out videos: expert above random {above:.0%}")
+            self._log(self._counters.agent_steps, {EXPERT_ABOVE_RANDOM: above, **figures})
+            of_videos = f"the learned reward on held-out videos: expert above random {above:.0%}"
+            self._console.print(in_words(sees) if sees else of_videos)
 
-    def _sight(self) -> bool:
-        """Whether the learned reward sees the task, logged and told, where someone can play for it.
-
-        Returns:
-            False where nobody can: for tasks without an expert, or where no episodes are wanted.
-        """
+    def _sight(self) -> Metrics:
+        """Whether the learned reward sees the task; nothing where nobody can play for it: for tasks without an expert,
+        or where no episodes are wanted."""
         episodes = self._config.sight_episodes
         if not (episodes and self._task.has_expert):
-            return False
+            return {}
         model, expert = self._components.reward_model, self._demos.expert
         rng = reference_rng(self._run.seed, self._counters.agent_steps)
 
         def label(video: Video) -> Rewards:
             return model.label(video, draw_references(model, expert, rng))
 
-        figures = sight(list(perform(self._run.task, self._environment, label, episodes)))
-        self._log(self._counters.agent_steps, {f"sight/{name}": value for name, value in figures.items()})
-        self._console.print(in_words(figures))
-        return True
+        performances = []
+        for performance in perform(self._run.task, self._environment, label, episodes):
+            performances.append(performance)
+            self._stop_if_requested()
+        return sight(performances)
 
     def showcase(self) -> None:
         """Expert, agent and random from the same starts, with the reward along them, for the report."""
