@@ -67,7 +67,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--task", default="reacher_hard")
-    parser.add_argument("--preset", default="cpu_pixels")
+    parser.add_argument("--preset", default="cpu")
     parser.add_argument("--demos", type=Path, required=True)
     parser.add_argument("--only", nargs="+", help="these variants alone")
     parser.add_argument("--steps", type=int, default=200, help="gradient steps of each variant")

@@ -203,7 +203,7 @@ def main() -> None:
     parser.add_argument("environment", choices=EXAMPLES)
     parser.add_argument("--out", type=Path, required=True, help="directory for videos, demos and the run")
     parser.add_argument("--episodes", type=int, default=200, help="expert episodes to film")
-    parser.add_argument("--preset", default="cpu_pixels")
+    parser.add_argument("--preset", default="cpu")
     parser.add_argument("--time-budget", default="40m")
     parser.add_argument("--threads", default="1")
     arguments = parser.parse_args()

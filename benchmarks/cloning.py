@@ -65,7 +65,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--task", default="reacher_hard")
-    parser.add_argument("--preset", default="cpu_pixels", help="whose agent and pictures")
+    parser.add_argument("--preset", default="cpu", help="whose agent and pictures")
     parser.add_argument("--videos", type=int, default=1000, help="expert episodes to clone")
     parser.add_argument("--updates", type=int, default=4000, help="gradient steps of each variant")
     parser.add_argument("--episodes", type=int, default=20, help="to judge each clone by, 60 steps each")

@@ -182,7 +182,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--task", default="reacher_hard", choices=[name for name in TASKS if TASKS[name].has_expert]
     )
-    parser.add_argument("--preset", default="cpu_pixels", help="whose pictures and reward model")
+    parser.add_argument("--preset", default="cpu", help="whose pictures and reward model")
     parser.add_argument("--gradient-steps", type=int, default=120, help="of each alignment")
     parser.add_argument("--videos", type=int, default=120, help="expert and random videos each to learn from")
     parser.add_argument(

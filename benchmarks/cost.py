@@ -88,7 +88,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--task", default="reacher_hard")
-    parser.add_argument("--preset", default="cpu_pixels", choices=list(PRESETS))
+    parser.add_argument("--preset", default="cpu", choices=list(PRESETS))
     parser.add_argument(
         "--steps", type=int, default=300, help=f"agent steps of a block, {BLOCKS} of which are timed, twice"
     )

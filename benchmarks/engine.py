@@ -32,7 +32,7 @@ from benchmarks.plain.drqv2 import PlainDrQv2, PlainReplay
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.envs.pictures import RenderProfile
 from bootifol.memory import keep_freed_memory
-from bootifol.presets import CPU_PIXELS, PAPER
+from bootifol.presets import CPU, PAPER
 from bootifol.progress import progress
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.reports.markdown import markdown_table
@@ -289,7 +289,7 @@ def main() -> None:
     torch.set_num_threads(arguments.threads)
     rates = measured_rates()
     rows: list[list[str]] = []
-    presets = {"paper": PAPER, "cpu": CPU_PIXELS}
+    presets = {"paper": PAPER, "cpu": CPU}
     with progress("timing", total=len(arguments.stages) * len(arguments.sizes)) as advance:
         for name in arguments.sizes:
             config = presets[name]

@@ -287,7 +287,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--preset", default="cpu_pixels", choices=list(PRESETS))
+    parser.add_argument("--preset", default="cpu", choices=list(PRESETS))
     parser.add_argument("--task", default="reacher_hard", help="whose stores are filled")
     parser.add_argument("--transitions", type=int, default=100_000, help="that replay holds")
     parser.add_argument("--steps", type=int, default=6000, help="agent steps of the small run")

@@ -31,7 +31,7 @@ from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError, require_at_least
-from bootifol.presets import CPU_PIXELS
+from bootifol.presets import CPU
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.tasks import TASKS
 
@@ -83,7 +83,7 @@ def read_within(directory: Path, memory: int, batch: int, gradient_steps: int) -
         read += len(demos.sample(min(batch, len(demos)), rng))
     seconds = time.perf_counter() - started
     if gradient_steps:
-        model = BootifolRewardModel(CPU_PIXELS.reward.bootifol, demos.manifest.video_size, seed=0)
+        model = BootifolRewardModel(CPU.reward.bootifol, demos.manifest.video_size, seed=0)
         steps = model.align(demos, demos)
         for _ in range(gradient_steps):
             next(steps)
@@ -133,7 +133,7 @@ def main(words: Sequence[str] | None = None) -> None:
     print(recorded(arguments.task, size, directory, arguments.workers), flush=True)
     on_disk = sum(file.stat().st_size for file in directory.iterdir())
     print(f"{on_disk / 10**9:.3f} GB on disk in {directory}", flush=True)
-    same_size = size.picture == CPU_PIXELS.pictures.video_size
+    same_size = size.picture == CPU.pictures.video_size
     gradient_steps = arguments.gradient_steps if same_size else 0
     try:
         with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as alone:

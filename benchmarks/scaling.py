@@ -330,7 +330,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--preset", default="cpu_pixels", choices=list(PRESETS))
+    parser.add_argument("--preset", default="cpu", choices=list(PRESETS))
     parser.add_argument("--threads", type=int, default=torch.get_num_threads())
     parser.add_argument("--runs", type=int, default=3, help="timed runs; quick work gets more")
     parser.add_argument("--panels", nargs="+", choices=list(PANELS), default=list(PANELS))

@@ -88,7 +88,7 @@ def main() -> None:
     parser.add_argument("task", help="from the catalogue")
     parser.add_argument("--demos", type=Path, required=True, help="directory of its demo sets")
     parser.add_argument("--reward", choices=REWARDS, default="bootifol")
-    parser.add_argument("--preset", default=None, help="cpu, or drawn for the drawn tasks, unless given")
+    parser.add_argument("--preset", default=None, help="frames, or drawn for the drawn tasks, unless given")
     parser.add_argument("--videos", type=int, default=200, help="expert videos, and as many random ones")
     parser.add_argument("--name", help="how the videos column calls them, instead of their number")
     parser.add_argument("--minutes", type=float, default=5.0, help="longest Alignment Phase")
@@ -101,7 +101,7 @@ def main() -> None:
         raise BootifolError(
             f"{arguments.task} has no expert to compare failures with: choose one of `bootifol tasks`"
         )
-    chosen = arguments.preset or ("drawn" if arguments.task.startswith("drawn") else "cpu")
+    chosen = arguments.preset or ("drawn" if arguments.task.startswith("drawn") else "frames")
     model, expert = aligned(
         arguments.reward, chosen, arguments.demos, arguments.videos, arguments.minutes, arguments.seed
     )

@@ -360,10 +360,10 @@ class Suite:
 SEVEN_TASKS = tuple(RETURNS)
 FIVE_SEEDS = (1, 2, 3, 4, 5)
 THREE_SEEDS = (1, 2, 3)
-_ablation = partial(Suite, preset="cpu_pixels", tasks=("reacher_hard",), seeds=THREE_SEEDS)
+_ablation = partial(Suite, preset="cpu", tasks=("reacher_hard",), seeds=THREE_SEEDS)
 
 SUITES = {
-    "reacher": Suite("every system on Reacher Hard", "cpu_pixels", ("reacher_hard",), (1,), every_system),
+    "reacher": Suite("every system on Reacher Hard", "cpu", ("reacher_hard",), (1,), every_system),
     "paper": Suite(
         "the paper's tables: seven tasks, every system, five seeds, the paper's sizes",
         "paper",
@@ -373,14 +373,14 @@ SUITES = {
     ),
     "cpu": Suite(
         "the same with the preset cpu, about an hour a run",
-        "cpu_pixels",
+        "cpu",
         SEVEN_TASKS,
         FIVE_SEEDS,
         every_system,
     ),
     "backbone": Suite(
         "bootifol from scratch and with a pretrained backbone on Drawer Close",
-        "cpu_pixels",
+        "cpu",
         ("drawer_close",),
         (1,),
         backbone_comparison,
@@ -430,15 +430,13 @@ SUITES = {
 VIDEOS = {
     "paper": 5032,
     "backbone": 1532,
-    "cpu": 600,
-    "long": 600,
-    "demo": 600,
-    "drawn": 400,
+    "cpu": 1000,
+    "long": 1000,
+    "demo": 700,
     "smoke": 12,
-    "cpu_pixels": 1000,
-    "long_pixels": 1000,
-    "demo_pixels": 700,
     "drawn_pixels": 150,
+    "frames": 600,
+    "drawn": 400,
 }
 """Expert videos to record for each preset. The paper learns from 5000, with a backbone from 1500; up to 32 are held
 out to see how they rank."""

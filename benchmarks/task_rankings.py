@@ -271,7 +271,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--tasks", nargs="+", default=list(RETURNS), choices=list(TASKS), help="the seven by default"
     )
-    parser.add_argument("--preset", default="cpu_pixels", help="whose pictures and reward model")
+    parser.add_argument("--preset", default="cpu", help="whose pictures and reward model")
     parser.add_argument("--gradient-steps", type=int, help="of each alignment; the preset's by default")
     parser.add_argument("--videos", type=int, default=200, help="expert and random videos each to learn from")
     parser.add_argument("--held-out", type=int, default=HALF_GOOD_VIDEOS, help="videos of each kind to rank")

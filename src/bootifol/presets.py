@@ -31,9 +31,7 @@ PresetName = Literal[
     "drawn",
     "smoke",
     "backbone",
-    "cpu_pixels",
-    "long_pixels",
-    "demo_pixels",
+    "frames",
     "drawn_pixels",
 ]
 
@@ -41,7 +39,7 @@ PAPER = TrainingConfig()
 """The paper's hyperparameters, which are the defaults of every field; what the paper leaves open (frame drop, window,
 margin, warm-up, replay) is as in the authors' release (docs/bootifol.md)."""
 
-CPU_PIXELS = TrainingConfig(
+CPU = TrainingConfig(
     pictures=PictureConfig(agent_size=64, video_size=64),
     reward=RewardConfig(
         BootifolConfig(
@@ -104,19 +102,17 @@ CPU_PIXELS = TrainingConfig(
 )
 """The same algorithm with smaller networks, pictures and counts: one to two hours on one core, and 8 GB.
 
-Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU_PIXELS has:
+Beyond smaller sizes it departs from the paper where the paper's choice needs more gradient steps than a CPU has:
 `motion`, `sequence_times`, `references` and `reward_scale` of the reward model, `relabel_episodes`, by which stored
 rewards follow it, `saturation_weight`, `ema_decay` and `cloning_weight` of the agent, `demonstrations`, by which the
 policy starts as a clone of the videos, and `augmentation` where these come from files; each is described at its field.
 """
 
-LONG_PIXELS = replace(
-    CPU_PIXELS,
-    agent=replace(
-        CPU_PIXELS.agent, encoder="coarse", batch_size=64, update_every=10, replay_capacity=100_000
-    ),
-    interactive=replace(CPU_PIXELS.interactive, agent_steps=1_550_000, reward_updates_until=60_000),
-    evaluation=replace(CPU_PIXELS.evaluation, every=25_000),
+LONG = replace(
+    CPU,
+    agent=replace(CPU.agent, encoder="coarse", batch_size=64, update_every=10, replay_capacity=100_000),
+    interactive=replace(CPU.interactive, agent_steps=1_550_000, reward_updates_until=60_000),
+    evaluation=replace(CPU.evaluation, every=25_000),
 )
 """`cpu` with an evening's time: the paper's 1.55M agent steps in about two and a half hours of one core, with smaller
 updates and fewer of them (docs/performance.md)."""
@@ -131,32 +127,28 @@ BACKBONE = TrainingConfig(
 one N_train for everything, 375K; the authors' released configurations stop the encoders earlier, after 60K (Button
 Press), 112.5K (Plate Slide) and 350K agent steps (Drawer Close): `--interactive.reward-updates-until`."""
 
-DEMO_PIXELS = replace(
-    CPU_PIXELS,
-    agent=replace(CPU_PIXELS.agent, replay_capacity=20_000),
+DEMO = replace(
+    CPU,
+    agent=replace(CPU.agent, replay_capacity=20_000),
     alignment=AlignmentConfig(gradient_steps=500, time_share=0.25),
-    interactive=replace(CPU_PIXELS.interactive, agent_videos=300),
-    demonstrations=replace(
-        CPU_PIXELS.demonstrations, inverse_dynamics_updates=1500, cloning_updates=4000, phases=1
-    ),
+    interactive=replace(CPU.interactive, agent_videos=300),
+    demonstrations=replace(CPU.demonstrations, inverse_dynamics_updates=1500, cloning_updates=4000, phases=1),
     evaluation=EvaluationConfig(every=2500, long_episodes=1, final_episodes=10),
     checkpoint_minutes=5.0,
 )
 """For `make demo`: `cpu` in minutes."""
 
 DRAWN_PIXELS = replace(
-    CPU_PIXELS,
+    CPU,
     pictures=PictureConfig(agent_size=32, video_size=32, stack=2),
     reward=RewardConfig(
-        replace(CPU_PIXELS.reward.bootifol, width_divisor=8),
-        virl=replace(CPU_PIXELS.reward.virl, width_divisor=8),
-        context_translation=replace(
-            CPU_PIXELS.reward.context_translation, width_divisor=8, image_weight=0.28
-        ),
-        gaifo=replace(CPU_PIXELS.reward.gaifo, width_divisor=8),
+        replace(CPU.reward.bootifol, width_divisor=8),
+        virl=replace(CPU.reward.virl, width_divisor=8),
+        context_translation=replace(CPU.reward.context_translation, width_divisor=8, image_weight=0.28),
+        gaifo=replace(CPU.reward.gaifo, width_divisor=8),
     ),
     agent=replace(
-        CPU_PIXELS.agent,
+        CPU.agent,
         hidden_dim=128,
         batch_size=64,
         warm_up_steps=600,
@@ -186,17 +178,17 @@ with nothing cloned. The learning test runs it. N_train is the share of the pape
 four here (docs/results/drawn_home.md)."""
 
 SMOKE = replace(
-    CPU_PIXELS,
+    CPU,
     reward=RewardConfig(
-        replace(CPU_PIXELS.reward.bootifol, width_divisor=16, videos_per_class=4),
-        virl=replace(CPU_PIXELS.reward.virl, width_divisor=16, videos_per_class=4),
+        replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=4),
+        virl=replace(CPU.reward.virl, width_divisor=16, videos_per_class=4),
         context_translation=replace(
-            CPU_PIXELS.reward.context_translation, width_divisor=16, pairs=4, image_weight=0.035
+            CPU.reward.context_translation, width_divisor=16, pairs=4, image_weight=0.035
         ),
-        gaifo=replace(CPU_PIXELS.reward.gaifo, width_divisor=16, videos_per_class=4),
+        gaifo=replace(CPU.reward.gaifo, width_divisor=16, videos_per_class=4),
     ),
     agent=replace(
-        CPU_PIXELS.agent,
+        CPU.agent,
         hidden_dim=64,
         batch_size=32,
         warm_up_steps=240,
@@ -205,10 +197,10 @@ SMOKE = replace(
     ),
     alignment=AlignmentConfig(gradient_steps=60, log_every=5),
     interactive=replace(
-        CPU_PIXELS.interactive, agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150
+        CPU.interactive, agent_steps=900, reward_updates_until=600, agent_videos=50, log_every=150
     ),
     demonstrations=replace(
-        CPU_PIXELS.demonstrations, videos=20, inverse_dynamics_updates=30, cloning_updates=30, phases=1
+        CPU.demonstrations, videos=20, inverse_dynamics_updates=30, cloning_updates=30, phases=1
     ),
     evaluation=EvaluationConfig(
         every=450,
@@ -241,42 +233,23 @@ def _seeing(pixels: TrainingConfig, frames: FrameConfig, **agent: Any) -> Traini
     )
 
 
-CPU = _seeing(
-    CPU_PIXELS,
+FRAMES = _seeing(
+    CPU,
     FrameConfig(),
     hidden_dim=256,
     batch_size=256,
     learning_rate=3e-4,
-    cloning_weight=1.0,
     replay_capacity=300_000,
 )
-CPU = replace(
-    CPU,
+FRAMES = replace(
+    FRAMES,
     alignment=AlignmentConfig(gradient_steps=900),
     interactive=InteractiveConfig(
         agent_steps=200_000, reward_update_every=8, reward_updates_until=200_000, agent_videos=1000
     ),
-    evaluation=EvaluationConfig(every=20_000, long_episodes=5, final_episodes=50),
+    evaluation=replace(CPU.evaluation, every=20_000),
 )
-"""BootIfOL with a reward from single frames, and an agent that reads what its eyes make of them and starts as a clone
-of the videos; about an hour of one core."""
-
-LONG = replace(
-    CPU,
-    interactive=replace(CPU.interactive, agent_steps=1_550_000, reward_updates_until=1_550_000),
-    agent=replace(CPU.agent, update_every=4),
-    evaluation=replace(CPU.evaluation, every=50_000),
-)
-"""`cpu` for an evening: the paper's 1.55M agent steps."""
-
-DEMO = replace(
-    CPU,
-    interactive=replace(CPU.interactive, agent_steps=20_000, reward_updates_until=20_000),
-    demonstrations=replace(CPU.demonstrations, phases=2),
-    evaluation=EvaluationConfig(every=10_000, long_episodes=2, final_episodes=10),
-    checkpoint_minutes=5.0,
-)
-"""For `make demo`: `cpu` in minutes."""
+"""`cpu` with a reward from single frames, and an agent that reads what its eyes make of them."""
 
 DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(), exploration_steps=6000, replay_capacity=20_000)
 DRAWN = replace(
@@ -302,9 +275,7 @@ PRESETS: dict[PresetName, TrainingConfig] = {
     "drawn": DRAWN,
     "smoke": SMOKE,
     "backbone": BACKBONE,
-    "cpu_pixels": CPU_PIXELS,
-    "long_pixels": LONG_PIXELS,
-    "demo_pixels": DEMO_PIXELS,
+    "frames": FRAMES,
     "drawn_pixels": DRAWN_PIXELS,
 }
 
@@ -312,19 +283,22 @@ PRESETS: dict[PresetName, TrainingConfig] = {
 SEEING_METHODS = ("bootifol", "environment")
 """Methods whose reward has eyes that an agent can share."""
 
+WITHOUT_EYES = {"drawn": "drawn_pixels", "frames": "cpu"}
+"""What other methods get in place of a preset whose agent reads what the reward's eyes make of a frame."""
+
 
 def preset(name: str, method: str = "bootifol") -> TrainingConfig:
     """Looks a preset up.
 
     Args:
         name: of the preset.
-        method: whose run it is for. One whose reward has no eyes gets `NAME_pixels` instead, where there is one.
+        method: whose run it is for. One whose reward has no eyes gets another in its place (`WITHOUT_EYES`).
 
     Raises:
         BootifolError: there is none of that name.
     """
-    if method not in SEEING_METHODS and f"{name}_pixels" in PRESETS:
-        name = f"{name}_pixels"
+    if method not in SEEING_METHODS:
+        name = WITHOUT_EYES.get(name, name)
     for known, config in PRESETS.items():
         if known == name:
             return config

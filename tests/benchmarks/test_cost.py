@@ -13,7 +13,7 @@ from benchmarks.suites import SMALL, PlannedRun, System, backbone_comparison
 
 from benchmarks import cost
 from bootifol.errors import BootifolError
-from bootifol.presets import CPU_PIXELS
+from bootifol.presets import CPU
 
 ROW = dict.fromkeys(cost.COLUMNS, "1")
 
@@ -67,18 +67,18 @@ def test_only_what_is_missing_is_measured(
 
 
 def test_an_unknown_system_is_named() -> None:
-    assert "random" not in [system.name for system in cost.systems("cpu_pixels", None, "reacher_hard")]
+    assert "random" not in [system.name for system in cost.systems("cpu", None, "reacher_hard")]
     with pytest.raises(BootifolError, match="there is no system 'magic'; the systems are bootifol,"):
-        cost.systems("cpu_pixels", ["magic"], "reacher_hard")
+        cost.systems("cpu", ["magic"], "reacher_hard")
 
 
 def test_the_backbone_is_measured_where_the_paper_has_it_or_when_asked_for() -> None:
     measured = {
-        task: [system.name for system in cost.systems("cpu_pixels", None, task)]
+        task: [system.name for system in cost.systems("cpu", None, task)]
         for task in ("reacher_hard", "drawer_close")
     }
     assert [*measured["reacher_hard"][:2], "bootifol-backbone"] == measured["drawer_close"][:3]
-    assert [system.name for system in cost.systems("cpu_pixels", ["bootifol-backbone"], "reacher_hard")] == [
+    assert [system.name for system in cost.systems("cpu", ["bootifol-backbone"], "reacher_hard")] == [
         "bootifol-backbone"
     ]
 
@@ -94,9 +94,7 @@ def test_videos_of_another_size_are_recorded_apart(
         return subprocess.CompletedProcess(command, 0)
 
     monkeypatch.setattr(subprocess, "run", record_nothing)
-    small, large = (
-        PlannedRun("drawn_home", "cpu_pixels", system, 1) for system in backbone_comparison(CPU_PIXELS, False)
-    )
+    small, large = (PlannedRun("drawn_home", "cpu", system, 1) for system in backbone_comparison(CPU, False))
     assert cost.videos_of(small, tmp_path, tmp_path / "spare") == tmp_path / "drawn_home"
     assert not recorded
     assert cost.videos_of(large, tmp_path, tmp_path / "spare") == tmp_path / "spare" / "drawn_home-224"

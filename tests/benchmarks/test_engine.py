@@ -18,14 +18,14 @@ from benchmarks.engine import (
 )
 
 from benchmarks import engine
-from bootifol.presets import CPU_PIXELS
+from bootifol.presets import CPU
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.rewards.registry import RewardConfig
 from bootifol.training.config import TrainingConfig
 
-REWARD = replace(CPU_PIXELS.reward.bootifol, width_divisor=16, videos_per_class=2)
-CONFIG = replace(CPU_PIXELS, reward=RewardConfig(REWARD), agent=replace(CPU_PIXELS.agent, batch_size=4))
+REWARD = replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=2)
+CONFIG = replace(CPU, reward=RewardConfig(REWARD), agent=replace(CPU.agent, batch_size=4))
 """The preset with narrow reward networks and few videos."""
 
 
@@ -94,7 +94,7 @@ def test_works_are_timed_in_turn_and_their_first_block_is_not_counted(
 def test_the_table_has_a_row_a_stage(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(engine, "CPU_PIXELS", CONFIG)
+    monkeypatch.setattr(engine, "CPU", CONFIG)
     monkeypatch.setattr(engine, "measured_rates", lambda: Rates(2e9, 1e12))
     monkeypatch.setattr(engine, "operations_of", lambda _: 8_000_000)
     monkeypatch.setattr(engine, "medians", lambda works, runs, block: [10.0, 25.0, 20.0][: len(works)])

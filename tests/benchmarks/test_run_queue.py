@@ -21,7 +21,7 @@ from fake_program import write_config, write_end
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
-from bootifol.presets import BACKBONE, CPU_PIXELS, SMOKE
+from bootifol.presets import BACKBONE, CPU, SMOKE
 
 AS_FAKED: Overrides = (
     ("interactive.agent_steps", 240),
@@ -162,7 +162,7 @@ def test_videos_are_as_long_as_the_runs_want_them() -> None:
     words = record_words("reacher_hard", BACKBONE, Path("demos"), 3, ["expert"])
     options = dict(itertools.pairwise(words))
     assert (options["--episode-steps"], options["--video-size"], options["--episodes"]) == ("50", "224", "3")
-    assert "--episode-steps" not in record_words("reacher_hard", CPU_PIXELS, Path("demos"), 3, ["expert"])
+    assert "--episode-steps" not in record_words("reacher_hard", CPU, Path("demos"), 3, ["expert"])
 
 
 def test_a_backbone_has_larger_videos_in_a_directory_of_their_own(suite: Path) -> None:

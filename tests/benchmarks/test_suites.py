@@ -23,7 +23,7 @@ from fake_program import write_config, write_end
 
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow, append_evaluations
-from bootifol.presets import BACKBONE, CPU_PIXELS, DRAWN_PIXELS, PAPER, PRESETS, preset
+from bootifol.presets import BACKBONE, CPU, DRAWN_PIXELS, PAPER, PRESETS, preset
 from bootifol.reports.paper_results import RETURNS
 from bootifol.reports.result_tables import result_tables
 from bootifol.reports.run_files import find_runs, read_run
@@ -100,9 +100,9 @@ def test_a_backbone_has_the_papers_preset_or_weights_that_are_there_already() ->
     papers, small = backbones("paper")[0], backbones("cpu")[0]
     assert (papers.preset, papers.demos_name) == ("backbone", "button_press-224")
     assert papers.config == replace(BACKBONE, threads=1)
-    lite = replace(CPU_PIXELS.reward.bootifol, backbone="efficientnet_lite0")
+    lite = replace(CPU.reward.bootifol, backbone="efficientnet_lite0")
     assert small.config.reward.bootifol == lite
-    assert small.config.pictures == replace(CPU_PIXELS.pictures, video_size=224)
+    assert small.config.pictures == replace(CPU.pictures, video_size=224)
     alone = SUITES["backbone"].runs("backbone")
     assert [run.system.name for run in alone] == ["bootifol"], "the preset has a backbone already"
 
@@ -144,19 +144,19 @@ def test_encoder_training_lengths_are_the_papers_or_the_same_shares() -> None:
     lengths = (0, 100_000, 375_000, 1_550_000)
     assert [equivalent_steps(PAPER, length, timed=False) for length in lengths] == list(lengths)
     # 24,000 of cpu's 30,000 steps follow its warm-up: 24,000 * (100,000 - 1920) / (1,550,000 - 1920) = 1521
-    assert [equivalent_steps(CPU_PIXELS, length, timed=False) for length in lengths] == [
+    assert [equivalent_steps(CPU, length, timed=False) for length in lengths] == [
         0,
         7521,
         11_784,
         30_000,
     ]
-    assert equivalent_steps(CPU_PIXELS, 375_000, timed=True) == round(30_000 * 375 / 1550)
+    assert equivalent_steps(CPU, 375_000, timed=True) == round(30_000 * 375 / 1550)
 
 
 def test_virl_takes_twice_as_many_gradient_steps_as_bootifol_whatever_the_preset() -> None:
     assert virl_updates_every(PAPER) == 50  # N_update, with which the paper says so
     # cpu: 500 in the Alignment Phase and 9000 / 50 after it, twice that in 24,000 agent steps
-    assert virl_updates_every(CPU_PIXELS) == round(24_000 / (2 * 680)) == 18
+    assert virl_updates_every(CPU) == round(24_000 / (2 * 680)) == 18
     # Not fewer because BootIfOL's reward rests after 6 % of learning there: 940 agent steps are the paper's 375K.
     assert virl_updates_every(DRAWN_PIXELS) == round(3900 / (2 * (150 + 940 / 50))) == 12
 
@@ -189,7 +189,7 @@ def test_a_method_of_ones_own_stands_beside_the_others() -> None:
 
 def test_a_remedy_is_taken_away_from_the_preset_and_cloning_only_where_there_is_some() -> None:
     drawn, cpu = (
-        {run.system.variant: run for run in runs_of_remedies(name)} for name in ("drawn_pixels", "cpu_pixels")
+        {run.system.variant: run for run in runs_of_remedies(name)} for name in ("drawn_pixels", "cpu")
     )
     assert cpu.keys() - drawn.keys() == {"nothing_cloned"}
     assert drawn["rewards_stored_once"].config.interactive.relabel_episodes == 0
@@ -212,20 +212,20 @@ def test_two_precisions_differ_in_the_arithmetic_of_agent_and_reward_alone() -> 
 def test_a_preset_that_clones_shows_what_cloning_alone_brings() -> None:
     names = {
         name: [system.name for system in every_system(preset(name), False)]
-        for name in ("cpu_pixels", "drawn_pixels")
+        for name in ("cpu", "drawn_pixels")
     }
-    assert set(names["cpu_pixels"]) - set(names["drawn_pixels"]) == {"bootifol-cloning_alone"}
-    environment = next(system for system in every_system(CPU_PIXELS, False) if system.method == "environment")
-    assert with_overrides(CPU_PIXELS, environment.overrides).agent.exploration(10_000) > 0.5
+    assert set(names["cpu"]) - set(names["drawn_pixels"]) == {"bootifol-cloning_alone"}
+    environment = next(system for system in every_system(CPU, False) if system.method == "environment")
+    assert with_overrides(CPU, environment.overrides).agent.exploration(10_000) > 0.5
 
 
 def test_overrides_of_one_section_are_set_together() -> None:
     changed = with_overrides(
-        CPU_PIXELS, (("reward.bootifol.reward", "cosine"), ("reward.bootifol.reward_scale", "none"))
+        CPU, (("reward.bootifol.reward", "cosine"), ("reward.bootifol.reward_scale", "none"))
     )
     assert (changed.reward.bootifol.reward, changed.reward.bootifol.reward_scale) == ("cosine", "none")
     with pytest.raises(BootifolError, match="reward_scale alignment is for the distance reward"):
-        with_overrides(CPU_PIXELS, (("reward.bootifol.reward", "cosine"),))
+        with_overrides(CPU, (("reward.bootifol.reward", "cosine"),))
 
 
 def test_every_preset_says_how_many_videos_its_runs_want() -> None:

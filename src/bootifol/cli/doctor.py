@@ -63,7 +63,7 @@ def doctor() -> int:
         "--threads",
         "ms an update of the agent",
         "ms a gradient step of the reward",
-        title="Learning with the preset cpu_pixels",
+        title="Learning with the preset cpu",
         title_justify="left",
     )
     by_threads = milliseconds_by_threads(thread_counts(_cores()))
@@ -153,7 +153,7 @@ def advised_threads(measured: dict[int, tuple[float, float]]) -> int:
 
 
 def milliseconds_by_threads(counts: list[int]) -> dict[int, tuple[float, float]]:
-    """Time of an update of the agent and of a gradient step of the reward on the CPU, with the preset `cpu_pixels`.
+    """Time of an update of the agent and of a gradient step of the reward on the CPU, with the preset `cpu`.
 
     Args:
         counts: of the threads to try. They take turns, so that other work on the machine slows all alike.
@@ -162,13 +162,13 @@ def milliseconds_by_threads(counts: list[int]) -> dict[int, tuple[float, float]]
 
     from bootifol.agents.drqv2 import DrQv2
     from bootifol.demos.agent_videos import AgentVideos
-    from bootifol.presets import CPU_PIXELS
+    from bootifol.presets import CPU
     from bootifol.rewards.bootifol.model import BootifolRewardModel
     from bootifol.types import Batch, Video
 
-    pictures, batch_size = CPU_PIXELS.pictures, CPU_PIXELS.agent.batch_size
-    agent = DrQv2(CPU_PIXELS.agent, pictures.agent_size, pictures.stack, _ACTION_DIM, seed=0)
-    reward = BootifolRewardModel(CPU_PIXELS.reward.bootifol, pictures.video_size, seed=0)
+    pictures, batch_size = CPU.pictures, CPU.agent.batch_size
+    agent = DrQv2(CPU.agent, pictures.agent_size, pictures.stack, _ACTION_DIM, seed=0)
+    reward = BootifolRewardModel(CPU.reward.bootifol, pictures.video_size, seed=0)
     rng = np.random.default_rng(0)
     shape = (batch_size, pictures.agent_size, pictures.agent_size, 3 * pictures.stack)
     seen, seen_next = (
@@ -176,7 +176,7 @@ def milliseconds_by_threads(counts: list[int]) -> dict[int, tuple[float, float]]
     )
     rewards = torch.zeros(batch_size)
     batch = Batch(seen, torch.zeros(batch_size, _ACTION_DIM), rewards, rewards, seen_next)
-    size, count = pictures.video_size, CPU_PIXELS.reward.bootifol.videos_per_class
+    size, count = pictures.video_size, CPU.reward.bootifol.videos_per_class
     videos = AgentVideos(count, _FRAMES, size)
     for index in range(count):
         videos.add(Video(str(index), rng.integers(0, 256, (_FRAMES, size, size, 3), dtype=np.uint8)))

@@ -62,9 +62,10 @@ def train(
         method: bootifol, virl, context_translation and gaifo learn a reward from the videos; environment uses the true
             reward, as an upper bound. MODULE:NAME is a method of your own (docs/add_a_method.md).
         preset: paper: its hyperparameters. cpu: one to two hours on one core. long: the paper's 1.55M agent steps in
-            two and a half. demo: what `make demo` runs, in minutes. drawn: the tasks drawn with numpy, in two minutes.
-            smoke: every stage, in under two minutes. backbone: paper, with a pretrained EfficientNet-B0 that reads
-            videos of 224x224 pixels.
+            two and a half. demo: what `make demo` runs, in minutes. frames: cpu, with a reward from single frames
+            (docs/frames.md). drawn: the same for the tasks drawn with numpy, in minutes; drawn_pixels: with the paper's
+            objective. smoke: every stage, in under two minutes. backbone: paper, with a pretrained EfficientNet-B0
+            that reads videos of 224x224 pixels.
         demos: Directory of the videos, from `bootifol demos record` or `bootifol demos import`.
         out: Directory to write the run to, such as runs/first.
         seed: Of everything random.

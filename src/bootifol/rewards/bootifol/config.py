@@ -138,7 +138,7 @@ class BootifolConfig:
         if self.reward == "frames" and self.backbone is not None:
             raise BootifolError(
                 "bootifol: reward frames has eyes of its own and reads no backbone; leave one of them out, or take "
-                "reward distance and an agent that reads pictures, as --preset cpu_pixels does"
+                "reward distance and an agent that reads pictures, as --preset cpu does"
             )
         if self.videos_per_class < 2:
             raise BootifolError(
