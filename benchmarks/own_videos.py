@@ -174,7 +174,17 @@ def main() -> None:
             out = arguments.work / "runs" / f"{videos}_{kind}_{matched}_{seed}"
             shutil.rmtree(out, ignore_errors=True)
             demos = demos_of(arguments.work, videos, kind, matched)
-            words = ["train", "--task", TASK, "--preset", "drawn_pixels", "--demos", str(demos), "--out", str(out)]
+            words = [
+                "train",
+                "--task",
+                TASK,
+                "--preset",
+                "drawn_pixels",
+                "--demos",
+                str(demos),
+                "--out",
+                str(out),
+            ]
             words += ["--seed", str(seed), "--threads", "1", "--interactive.reward-updates-until", "0"]
             if bootifol(words) != 0:
                 raise SystemExit(1)
