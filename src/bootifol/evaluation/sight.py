@@ -20,7 +20,7 @@ from bootifol.experts.failures import failures_of, make_failure
 from bootifol.types import Metrics, Rewards, Video
 
 FIRST_SEED = 10**6
-"""Of the episodes; no training start and no recorded video has such a small one by chance more often than any other."""
+"""Of each performer's episodes; all play the same starts."""
 
 
 @dataclass(frozen=True)
