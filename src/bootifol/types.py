@@ -35,7 +35,7 @@ Features = NDArray[np.float32]
 """What a frozen pretrained network made of the pictures of one episode, float32 `[T + 1, F]`."""
 
 FrameStates = NDArray[np.int8]
-"""What eyes that rest made of the pictures of one episode, int8 `[T + 1, F]` (`networks/eyes.py`)."""
+"""What eyes that rest made of the pictures of one episode, int8 `[T + 1, Z]` (`networks/eyes.py`)."""
 
 FeatureBatch = NDArray[np.float32] | NDArray[np.int8]
 """Features or states of videos of one length, `[B, T + 1, F]`."""
@@ -110,7 +110,7 @@ class Batch:
 
     observation: torch.Tensor
     """uint8 `[B, 3 * stack, S, S]`, channels-last in memory, randomly shifted; or, where replay keeps the states of
-    frames, int8 `[B, stack * F]`."""
+    frames, int8 `[B, stack * Z]`."""
 
     action: torch.Tensor
     """float32 `[B, A]`."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bootifol.envs.rollout import Act
 from bootifol.experts import BUNDLED, script_of
-from bootifol.experts.behaviors import Controller
+from bootifol.experts.behaviors import Controller, WrongGoal
 from bootifol.experts.policy import StatePolicy
 from bootifol.types import Action, Observation
 
@@ -64,8 +64,7 @@ def make_failure(kind: str, task_name: str, environment: gymnasium.Env[Any, Any]
         simulator = environment.unwrapped.simulator  # type: ignore[attr-defined]
         controller = lambda goal: policy(simulator.state())  # noqa: E731
     rng = np.random.default_rng([seed, 5])
-    goal = rng if kind == "wrong_place" else None
-    return _Failure(kind, controller, environment, rng, None if goal is None else wrong_goal)
+    return _Failure(kind, controller, environment, rng, wrong_goal if kind == "wrong_place" else None)
 
 
 class _Failure:
@@ -77,7 +76,7 @@ class _Failure:
         controller: Controller,
         environment: gymnasium.Env[Any, Any],
         rng: np.random.Generator,
-        wrong_goal: Any,
+        wrong_goal: WrongGoal | None,
     ) -> None:
         self._kind, self._controller, self._rng, self._wrong_goal = kind, controller, rng, wrong_goal
         self._steps: int = environment.unwrapped.episode_steps  # type: ignore[attr-defined]

@@ -24,7 +24,7 @@ class BootifolConfig:
     reward: Literal["distance", "cosine", "frames"] = "distance"
     """distance (the paper): minus the Euclidean distance between the encodings of agent and expert.
     cosine (a version of the authors' release): their cosine similarity, in [-1, 1].
-    frames (beyond the paper): the chance that a single frame is the expert's (docs/frames.md); then only the section
+    frames (beyond the paper): how much a single frame looks like the expert's (docs/frames.md); then only the section
     `frames` is read, and what only a sequence needs is not built."""
 
     frames: FrameConfig = field(default_factory=FrameConfig)

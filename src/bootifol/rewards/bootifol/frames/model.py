@@ -38,7 +38,7 @@ EXPERT_FRAMES = 100_000
 
 
 class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
-    """The chance that a frame is the expert's, as a head on what the eyes make of it says.
+    """How much a frame looks like the expert's, as a head on what the eyes make of it says.
 
     Args:
         config: see there.
