@@ -83,7 +83,7 @@ SEEING = replace(
         bootifol=replace(
             TINY.reward.bootifol,
             reward="frames",
-            frames=FrameConfig(videos_per_class=2, frames_per_class=8, channels=2, width=4, hidden_dim=8),
+            frames=FrameConfig(videos_per_class=2, frames_per_class=8, width=4, hidden_dim=8),
         ),
     ),
     agent=replace(WITH_DEMONSTRATIONS.agent, observations="states", critic_norm=True, ema_decay=0.9),

@@ -105,7 +105,7 @@ def write_policy(path: Path, config: PolicyConfig, agent: DrQv2) -> None:
     arrays: Arrays = {
         f"{part}.{name}": to_host(parameter)
         for part, network in (("encoder", see), ("actor", actor))
-        for name, parameter in network.named_parameters()
+        for name, parameter in network.state_dict().items()
     }
     networks: dict[str, Any] = {
         "encoder": agent.config.encoder,
@@ -113,7 +113,7 @@ def write_policy(path: Path, config: PolicyConfig, agent: DrQv2) -> None:
         "hidden_dim": agent.config.hidden_dim,
     }
     if agent.eyes is not None:
-        networks["eyes"] = [agent.eyes.channels, agent.eyes.width]
+        networks["eyes"] = [agent.eyes.width]
     about = {"format": FORMAT, "policy": dataclasses.asdict(config), "networks": networks}
     write_arrays(path, arrays, {"bootifol": json.dumps(about)})
 

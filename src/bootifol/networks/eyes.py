@@ -1,4 +1,5 @@
-"""Eyes: a small convolutional network that makes 128 numbers of a frame, kept as whole ones once it rests."""
+"""Eyes: a small convolutional network that finds 64 points in a frame; their places are kept as whole numbers once it
+rests."""
 
 from __future__ import annotations
 
@@ -8,63 +9,78 @@ from torch import Tensor, nn
 
 from bootifol.types import Frames, FrameStates
 
-VIEW = 64
-"""Numbers in each of the two views of a frame, as in the paper's s = [g_1, g_2]."""
+POINTS = 64
+"""Points that the eyes follow in a frame."""
 
-STATE_SIZE = 2 * VIEW
-"""Z, numbers in a state."""
+STATE_SIZE = 2 * POINTS
+"""Z, numbers in a state: where each point is, across and down."""
 
-_CELLS = 8
-"""Cells along each side of the last map, whatever the size of the pictures."""
+VIEW = STATE_SIZE // 2
+"""Numbers in each of the two halves of a state, as the paper's s has two: 32 points each."""
 
-_SCALE = 8.0
-"""Length of a view: the square root of its 64 numbers, so that each is about 1."""
+_CELLS = 32
+"""Cells along each side of the map, or a few more."""
 
 _LEVELS = 127 / 4
-"""States are kept in steps of 4 / 127, from -4 to 4."""
+"""States are kept in steps of 4 / 127, from -4 to 4 standard deviations."""
 
 _FRAMES_AT_ONCE = 256
 """Frames in one pass, which bounds the memory."""
 
 
 class Eyes(nn.Module):
-    """Three convolutions to a map of 8 x 8 cells, and two linear views of it.
+    """Three convolutions to a map of about 32 x 32 cells, and where in it 64 points are.
+
+    A point is where one mixture of the map's features is strongest: across, the mean column under a softmax over
+    columns, each with its strongest cell; down, likewise with rows. So a state says in numbers what an agent must know,
+    where things are, to a fraction of a pixel. (Points by a softmax over space: Finn et al., "Deep Spatial Autoencoders
+    for Visuomotor Learning", 2016; over one axis at a time: Jakab et al., "Unsupervised Learning of Object Landmarks
+    through Conditional Image Generation", 2018.)
 
     Args:
         video_size: S, the (square) pictures' side in pixels.
-        channels: features of a cell.
-        width: channels of the two inner layers.
+        width: features of a cell.
     """
 
     feature_size = STATE_SIZE
 
-    def __init__(self, video_size: int, channels: int, width: int) -> None:
+    def __init__(self, video_size: int, width: int) -> None:
         super().__init__()
-        self.channels, self.width = channels, width
-        # The last layer halves the map.
-        stride = max(video_size // (2 * _CELLS), 1)
+        self.width = width
+        stride = max(video_size // _CELLS, 1)
         self.convolutions = nn.Sequential(
-            nn.Conv2d(3, width, 2 * stride, stride, (stride + 1) // 2),
+            nn.Conv2d(3, width, max(2 * stride, 3), stride, (stride + 1) // 2),
             nn.ReLU(),
             nn.Conv2d(width, width, 3, 1, 1),
             nn.ReLU(),
-            nn.Conv2d(width, channels, 4, 2, 1),
-            nn.Tanh(),
+            nn.Conv2d(width, width, 3, 1, 1),
+            nn.ReLU(),
         )
-        with torch.no_grad():
-            cells = self.convolutions(torch.zeros(1, 3, video_size, video_size)).numel()
-        self.views = nn.ModuleList([nn.Linear(cells, VIEW) for _ in range(2)])
+        self.points = nn.Linear(width, POINTS)
+        # Without parameters: what a thing's place varies by differs from thing to thing, and all of it matters.
+        self.normalization = nn.BatchNorm1d(STATE_SIZE, affine=False)
         self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def forward(self, frames: Tensor) -> Tensor:
-        """States float32 `[N, Z]` of frames uint8 `[N, S, S, 3]`; each half has length 8."""
+        """States float32 `[N, Z]` of frames uint8 `[N, S, S, 3]`, each number about of mean 0 and variance 1."""
         pictures = frames.permute(0, 3, 1, 2).float() / 255 - 0.5
-        cells = self.convolutions(pictures).permute(0, 2, 3, 1).flatten(1)
-        views = [nn.functional.normalize(view(cells).float(), dim=1) for view in self.views]
-        return _SCALE * torch.cat(views, 1)
+        cells = self.convolutions(pictures).permute(0, 2, 3, 1)
+        places = [self._places(cells.amax(rows_or_columns)) for rows_or_columns in (1, 2)]
+        normalized: Tensor = self.normalization(torch.stack(places, -1).flatten(1))
+        return normalized
+
+    def _places(self, cells: Tensor) -> Tensor:
+        """Mean places float32 `[N, POINTS]` in [-1, 1] along an axis, of its strongest cells `[N, axis, width]`."""
+        chances = self.points(cells).float().softmax(1)
+        axis = torch.linspace(-1.0, 1.0, cells.shape[1], device=cells.device)
+        places: Tensor = chances.transpose(1, 2) @ axis
+        return places
 
     def states(self, frames: Frames) -> FrameStates:
-        """The same in whole numbers, int8 `[N, Z]`, of frames uint8 `[N, S, S, 3]`, without gradients."""
+        """The same in whole numbers, int8 `[N, Z]`, of frames uint8 `[N, S, S, 3]`, without gradients and, whatever the
+        mode, with the running statistics: what is seen of a frame depends on no other."""
+        learning = self.training
+        self.eval()
         device = next(self.parameters()).device
         states = np.empty((len(frames), STATE_SIZE), np.int8)
         with torch.inference_mode():
@@ -73,6 +89,7 @@ class Eyes(nn.Module):
                 seen = self(torch.from_numpy(frames[part]).to(device))
                 whole = torch.round(seen * _LEVELS).clamp_(-127, 127)
                 states[part] = whole.to(torch.int8).cpu().numpy()
+        self.train(learning)
         return states
 
 

@@ -42,11 +42,8 @@ class FrameConfig:
     """Share of random videos among the frames that are not the expert's in the Interactive Phase; the rest is the
     agent's."""
 
-    channels: int = 16
-    """Features of each of a map's 8 x 8 cells."""
-
-    width: int = 32
-    """Channels of the eyes' inner layers."""
+    width: int = 16
+    """Features of a cell of the eyes' map."""
 
     hidden_dim: int = 128
     """Width of the two hidden layers of the head."""
@@ -70,7 +67,7 @@ class FrameConfig:
         of_self = partial(fields_of, "frames", self)
         require_choices("frames", self)
         require_at_least(0, **of_self("frame_weight", "episode_weight", "time_weight", "shift", "noise"))
-        require_at_least(1, **of_self("frames_per_class", "channels", "width", "hidden_dim"))
+        require_at_least(1, **of_self("frames_per_class", "width", "hidden_dim"))
         require_at_least(2, **of_self("videos_per_class"))
         require_positive(**of_self("temperature", "learning_rate", "head_learning_rate"))
         require_share(**of_self("random_share"))

@@ -20,7 +20,7 @@ from bootifol.networks.eyes import STATE_SIZE, Eyes, as_features, rounding
 from bootifol.progress import progress
 from bootifol.rewards.bootifol.frames import losses
 from bootifol.rewards.bootifol.frames.config import FrameConfig
-from bootifol.rewards.bootifol.frames.networks import FrameNetworks, views
+from bootifol.rewards.bootifol.frames.networks import FrameNetworks
 from bootifol.rewards.learned import LearnedRewardModel
 from bootifol.types import Arrays, FeatureSource, Frames, FrameStates, Metrics, Rewards, Video, VideoSource
 
@@ -181,7 +181,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
             seen = self.networks.eyes(self._on_device(shifted)).float()
         # As coarse as the states that will be kept.
         states = (seen + rounding(seen, self._rng)).unflatten(0, (len(frames), MOMENTS, 2))
-        of_episode, of_time = views(states)
+        of_episode, of_time = self.networks.views(states)
         expert_logits, other_logits = self.networks.logits(states).chunk(2)
         terms = {"frame": losses.frame_loss(expert_logits, other_logits)}
         if config.episode_weight > 0:

@@ -13,7 +13,7 @@ from bootifol.rewards.bootifol.frames.config import FrameConfig
 
 
 class FrameNetworks(nn.Module):
-    """Eyes, and the head that rewards a state.
+    """Eyes, the head that rewards a state, and the projections that L_E and L_T contrast.
 
     Args:
         config: see there.
@@ -22,7 +22,8 @@ class FrameNetworks(nn.Module):
 
     def __init__(self, config: FrameConfig, video_size: int) -> None:
         super().__init__()
-        self.eyes = Eyes(video_size, config.channels, config.width)
+        self.eyes = Eyes(video_size, config.width)
+        self.projections = nn.ModuleList([nn.Linear(VIEW, VIEW) for _ in range(2)])
         self.head = nn.Sequential(
             nn.Linear(STATE_SIZE, config.hidden_dim),
             nn.ReLU(),
@@ -35,7 +36,8 @@ class FrameNetworks(nn.Module):
         """x `[...]` of states `[..., Z]`."""
         return cast(torch.Tensor, self.head(states)).squeeze(-1)
 
-
-def views(states: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Both halves of states `[..., Z]`, each `[..., 64]` of length 1: what L_E and what L_T contrast."""
-    return F.normalize(states[..., :VIEW], dim=-1), F.normalize(states[..., VIEW:], dim=-1)
+    def views(self, states: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """u and v `[..., 64]`, of length 1, of both halves of states `[..., Z]`: what L_E and what L_T contrast."""
+        halves = zip(self.projections, torch.split(states, VIEW, -1), strict=True)
+        u, v = (F.normalize(projection(half), dim=-1) for projection, half in halves)
+        return u, v
