@@ -240,29 +240,35 @@ FRAMES = _seeing(
     batch_size=256,
     learning_rate=3e-4,
     replay_capacity=300_000,
+    warm_up_steps=3000,
+    exploration_start=1.0,
+    exploration_steps=20_000,
+    cloning_weight=0.0,
+    ema_decay=0.0,
 )
 FRAMES = replace(
     FRAMES,
-    alignment=AlignmentConfig(gradient_steps=900),
+    alignment=AlignmentConfig(gradient_steps=2000),
     interactive=InteractiveConfig(
         agent_steps=200_000, reward_update_every=8, reward_updates_until=200_000, agent_videos=1000
     ),
-    evaluation=replace(CPU.evaluation, every=20_000),
+    demonstrations=DemonstrationConfig(),
+    evaluation=replace(CPU.evaluation, every=10_000),
 )
-"""`cpu` with a reward from single frames, and an agent that reads what its eyes make of them."""
+"""`cpu` with a reward from single frames, an agent that reads what its eyes make of them, and nothing cloned."""
 
-DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(), exploration_steps=6000, replay_capacity=20_000)
+DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(), replay_capacity=20_000)
 DRAWN = replace(
     DRAWN,
     alignment=AlignmentConfig(gradient_steps=600, time_share=0.25),
     interactive=InteractiveConfig(
-        agent_steps=16_000,
+        agent_steps=6000,
         reward_update_every=8,
-        reward_updates_until=16_000,
+        reward_updates_until=6000,
         agent_videos=300,
         log_every=500,
     ),
-    evaluation=replace(DRAWN.evaluation, every=2000),
+    evaluation=replace(DRAWN.evaluation, every=1000),
 )
 """For the tasks drawn with numpy, at 32 pixels: a policy from videos in minutes, without a simulator and with nothing
 cloned. The learning test runs it."""

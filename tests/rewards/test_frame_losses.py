@@ -14,7 +14,17 @@ def test_frame_loss_is_half_of_both_cross_entropies() -> None:
     # sigmoid(0) = 1/2 and sigmoid(log 3) = 3/4; of the others 1 - 1/2
     expert, other = torch.tensor([0.0, math.log(3)]), torch.tensor([0.0])
     by_hand = ((math.log(2) + math.log(4 / 3)) / 2 + math.log(2)) / 2
-    assert float(losses.frame_loss(expert, other)) == pytest.approx(by_hand)
+    assert float(losses.frame_loss(expert, other, torch.ones(2))) == pytest.approx(by_hand)
+
+
+def test_an_early_frame_counts_as_the_experts_by_its_lateness() -> None:
+    expert, other = torch.tensor([math.log(3)]), torch.tensor([0.0])
+    by_hand = (0.25 * math.log(4 / 3) + 0.75 * math.log(4) + math.log(2)) / 2
+    assert float(losses.frame_loss(expert, other, torch.tensor([0.25]))) == pytest.approx(by_hand)
+
+
+def test_the_second_half_of_a_video_is_late() -> None:
+    assert losses.lateness(torch.tensor([0, 3, 6, 12]), 13).tolist() == [0.0, 0.5, 1.0, 1.0]
 
 
 def test_contrast_is_the_mean_of_both_ways() -> None:

@@ -9,18 +9,31 @@ import torch
 import torch.nn.functional as F
 
 
-def frame_loss(expert: torch.Tensor, other: torch.Tensor) -> torch.Tensor:
-    """L_F: the head tells the expert's frames from others.
+def frame_loss(expert: torch.Tensor, other: torch.Tensor, lateness: torch.Tensor) -> torch.Tensor:
+    """L_F: the head tells the expert's frames from others, and its late ones from its early ones.
 
-    `L_F = -(E_expert[ log sigmoid(x) ] + E_other[ log sigmoid(-x) ]) / 2`
+    `L_F = -(E_expert[ w log sigmoid(x) + (1 - w) log sigmoid(-x) ] + E_other[ log sigmoid(-x) ]) / 2`
 
-    It is log 2 for a head that knows nothing.
+    An expert begins where anybody begins: where it has got to is what it is for. So a frame counts as the expert's
+    with its lateness w. It is log 2 for a head that knows nothing.
 
     Args:
         expert: logits `[N]` of the expert's frames.
         other: logits `[M]` of random videos' or the agent's.
+        lateness: w `[N]` of the expert's frames, in [0, 1].
     """
-    return (F.softplus(-expert.float()).mean() + F.softplus(other.float()).mean()) / 2
+    bce = F.binary_cross_entropy_with_logits
+    return (bce(expert.float(), lateness) + F.softplus(other.float()).mean()) / 2
+
+
+def lateness(frame: torch.Tensor, frames: int) -> torch.Tensor:
+    """w of L_F: `min(1, 2 t / T)` of frame t of a video of T + 1 frames. The second half counts in full.
+
+    Args:
+        frame: t, of any shape.
+        frames: T + 1.
+    """
+    return (2.0 * frame / (frames - 1)).clamp(max=1.0)
 
 
 def bootstrap_loss(agent: torch.Tensor) -> torch.Tensor:

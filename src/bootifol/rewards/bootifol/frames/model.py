@@ -88,8 +88,9 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         videos = agent.sample_features(count - of_random, self._rng)
         rows = np.arange(len(videos))
         of_agent = videos[rows, self._rng.integers(videos.shape[1], size=len(videos))]
+        of_expert = self._rng.integers(len(self._expert), size=count)
         states = [
-            self._expert[self._rng.integers(len(self._expert), size=count)],
+            self._expert[of_expert],
             of_agent,
             random[self._rng.integers(max(len(random), 1), size=of_random)],
         ]
@@ -102,7 +103,9 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         logits = self.networks.logits(features)
         ends = (count, 2 * count - of_random)
         expert_logits, agent_logits, random_logits = torch.tensor_split(logits, ends)
-        frame = losses.frame_loss(expert_logits, random_logits)
+        of_each = self._frames_of_each(expert, EXPERT_FRAMES)
+        lateness = losses.lateness(self._on_device(of_expert % of_each), of_each)
+        frame = losses.frame_loss(expert_logits, random_logits, lateness)
         bootstrap = losses.bootstrap_loss(agent_logits)
         terms = {"loss/frame": frame, "loss/bootstrap": bootstrap}
         metrics = step.take(frame + self.config.agent_weight * bootstrap, terms)
@@ -155,8 +158,8 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         return self._random
 
     def _some_states(self, videos: VideoSource, most: int) -> FrameStates:
-        """States of all frames `[N, Z]`, or of as many of each video as give `most`."""
-        of_each = min(max(most // len(videos), 1), len(videos[0].frames))
+        """States `[N, Z]` of all frames, or of as many of each video, evenly spaced, as give `most`."""
+        of_each = self._frames_of_each(videos, most)
         kept = np.random.default_rng(0).permutation(len(videos))[:most]
         states = []
         with progress("what the eyes see of the videos", len(kept)) as advance:
@@ -165,6 +168,10 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
                 states.append(self.states(frames[np.linspace(0, len(frames) - 1, of_each).astype(int)]))
                 advance(1)
         return np.concatenate(states)
+
+    @staticmethod
+    def _frames_of_each(videos: VideoSource, most: int) -> int:
+        return min(max(most // len(videos), 2), len(videos[0].frames))
 
     def _align_step(self, expert: VideoSource, other: VideoSource) -> Metrics:
         config = self.config
@@ -183,7 +190,9 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         states = (seen + rounding(seen, self._rng)).unflatten(0, (len(frames), MOMENTS, 2))
         of_episode, of_time = self.networks.views(states)
         expert_logits, other_logits = self.networks.logits(states).chunk(2)
-        terms = {"frame": losses.frame_loss(expert_logits, other_logits)}
+        of_expert = times[: config.videos_per_class].reshape(-1, MOMENTS, 2)
+        lateness = losses.lateness(self._on_device(of_expert), videos[0].shape[1])
+        terms = {"frame": losses.frame_loss(expert_logits, other_logits, lateness)}
         if config.episode_weight > 0:
             moments = of_episode[:, :, 0].transpose(0, 1)
             terms["episode"] = losses.contrast(moments, moments.roll(1, 0), config.temperature)
