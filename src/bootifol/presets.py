@@ -244,7 +244,6 @@ FRAMES = _seeing(
     exploration_start=1.0,
     exploration_steps=20_000,
     cloning_weight=0.0,
-    ema_decay=0.0,
 )
 FRAMES = replace(
     FRAMES,
