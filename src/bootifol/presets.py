@@ -256,7 +256,7 @@ FRAMES = replace(
 )
 """`cpu` with a reward from single frames, an agent that reads what its eyes make of them, and nothing cloned."""
 
-DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(), replay_capacity=20_000)
+DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(late_from=0.0), replay_capacity=20_000)
 DRAWN = replace(
     DRAWN,
     alignment=AlignmentConfig(gradient_steps=600, time_share=0.25),

@@ -24,7 +24,9 @@ def test_an_early_frame_counts_as_the_experts_by_its_lateness() -> None:
 
 
 def test_the_second_half_of_a_video_is_late() -> None:
-    assert losses.lateness(torch.tensor([0, 3, 6, 12]), 13).tolist() == [0.0, 0.5, 1.0, 1.0]
+    frames = torch.tensor([0, 3, 6, 12])
+    assert losses.lateness(frames, 13, late_from=0.5).tolist() == [0.0, 0.5, 1.0, 1.0]
+    assert losses.lateness(frames, 13, late_from=0.0).tolist() == [1.0, 1.0, 1.0, 1.0]
 
 
 def test_contrast_is_the_mean_of_both_ways() -> None:

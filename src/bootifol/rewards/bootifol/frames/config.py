@@ -16,6 +16,10 @@ class FrameConfig:
     frame_weight: float = 0.5
     """Weight of L_F, which tells the expert's frames from others."""
 
+    late_from: float = 0.5
+    """c of L_F: the part of an expert video after which a frame counts as the expert's in full; before it, the less the
+    earlier it is. 0 counts every frame alike."""
+
     episode_weight: float = 0.3
     """Weight of L_E, which tells what is one episode's alone: where its goal lies. 0 leaves it out."""
 
@@ -70,4 +74,4 @@ class FrameConfig:
         require_at_least(1, **of_self("frames_per_class", "width", "hidden_dim"))
         require_at_least(2, **of_self("videos_per_class"))
         require_positive(**of_self("temperature", "learning_rate", "head_learning_rate"))
-        require_share(**of_self("random_share"))
+        require_share(**of_self("random_share", "late_from"))

@@ -26,14 +26,17 @@ def frame_loss(expert: torch.Tensor, other: torch.Tensor, lateness: torch.Tensor
     return (bce(expert.float(), lateness) + F.softplus(other.float()).mean()) / 2
 
 
-def lateness(frame: torch.Tensor, frames: int) -> torch.Tensor:
-    """w of L_F: `min(1, 2 t / T)` of frame t of a video of T + 1 frames. The second half counts in full.
+def lateness(frame: torch.Tensor, frames: int, late_from: float) -> torch.Tensor:
+    """w of L_F: `min(1, t / (c T))` of frame t of a video of T + 1 frames, 1 throughout where c is 0.
 
     Args:
         frame: t, of any shape.
         frames: T + 1.
+        late_from: c, the part of a video after which a frame counts in full.
     """
-    return (2.0 * frame / (frames - 1)).clamp(max=1.0)
+    if late_from == 0:
+        return torch.ones_like(frame, dtype=torch.float32)
+    return (frame / (late_from * (frames - 1))).clamp(max=1.0).float()
 
 
 def bootstrap_loss(agent: torch.Tensor) -> torch.Tensor:

@@ -104,7 +104,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         ends = (count, 2 * count - of_random)
         expert_logits, agent_logits, random_logits = torch.tensor_split(logits, ends)
         of_each = self._frames_of_each(expert, EXPERT_FRAMES)
-        lateness = losses.lateness(self._on_device(of_expert % of_each), of_each)
+        lateness = losses.lateness(self._on_device(of_expert % of_each), of_each, self.config.late_from)
         frame = losses.frame_loss(expert_logits, random_logits, lateness)
         bootstrap = losses.bootstrap_loss(agent_logits)
         terms = {"loss/frame": frame, "loss/bootstrap": bootstrap}
@@ -191,7 +191,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         of_episode, of_time = self.networks.views(states)
         expert_logits, other_logits = self.networks.logits(states).chunk(2)
         of_expert = times[: config.videos_per_class].reshape(-1, MOMENTS, 2)
-        lateness = losses.lateness(self._on_device(of_expert), videos[0].shape[1])
+        lateness = losses.lateness(self._on_device(of_expert), videos[0].shape[1], config.late_from)
         terms = {"frame": losses.frame_loss(expert_logits, other_logits, lateness)}
         if config.episode_weight > 0:
             moments = of_episode[:, :, 0].transpose(0, 1)
