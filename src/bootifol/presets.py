@@ -259,11 +259,11 @@ FRAMES = replace(
 DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(late_from=0.0), replay_capacity=20_000)
 DRAWN = replace(
     DRAWN,
-    alignment=AlignmentConfig(gradient_steps=600, time_share=0.25),
+    alignment=AlignmentConfig(gradient_steps=1000, time_share=0.5),
     interactive=InteractiveConfig(
-        agent_steps=6000,
+        agent_steps=8000,
         reward_update_every=8,
-        reward_updates_until=6000,
+        reward_updates_until=8000,
         agent_videos=300,
         log_every=500,
     ),
