@@ -1,0 +1,134 @@
+"""What do the eyes tell of the true state? A small network reads it from the states of single frames (diagnosis only).
+
+    python -m benchmarks.probe reacher_hard --demos demos/reacher_hard --steps 900
+
+The eyes learn from the videos, as in a run. Then random actions play, the network learns each number of the
+simulator's own observation from what the eyes make of the frame, and the table says how well it does on held-out
+episodes: R² (1 is exact, 0 knows nothing) and the median absolute error in the simulator's units. For tasks of DeepMind
+Control. Speeds, and angles that turn without end, cannot be told from one frame.
+"""
+
+from __future__ import annotations
+
+import argparse
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from rich.console import Console
+from torch import nn
+
+from benchmarks.command import command
+from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.envs.dm_control import DMControlSimulator
+from bootifol.errors import BootifolError
+from bootifol.networks.eyes import as_features
+from bootifol.presets import preset
+from bootifol.progress import progress
+from bootifol.reports.markdown import markdown_table
+from bootifol.rewards.bootifol.frames.model import FrameRewardModel
+from bootifol.tasks import make_environment, task_named
+from bootifol.types import Frames
+
+HELD_ACTION = 10
+"""Largest number of agent steps of one random action."""
+
+KEPT = 0.25
+"""Share of the frames that are kept: neighbors look alike."""
+
+
+def watched(task: str, count: int) -> tuple[Frames, NDArray[np.float32], list[str]]:
+    """Frames `[N, S, S, 3]` of random actions, the simulator's observations `[N, O]`, and the names of these."""
+    environment = make_environment(task, preset("frames").pictures, task_named(task).episode_steps)
+    simulator = environment.simulator
+    if not isinstance(simulator, DMControlSimulator):
+        raise BootifolError(f"{task} is no task of DeepMind Control, whose observations the probe reads")
+    rng = np.random.default_rng(0)
+    frames: list[Frames] = []
+    truths = []
+    names: list[str] = []
+    with progress("random actions", count) as advance:
+        episode = 0
+        while len(frames) < count:
+            environment.reset(seed=10**7 + episode)
+            episode += 1
+            for step in range(environment.episode_steps):
+                if step == 0 or rng.random() < 2 / HELD_ACTION:
+                    action = rng.uniform(-1, 1, environment.action_space.shape or ()).astype(np.float32)
+                *_, info = environment.step(action)
+                if rng.random() < KEPT and len(frames) < count:
+                    observation = simulator.environment.task.get_observation(simulator.physics)
+                    names = [
+                        f"{name}[{i}]" for name, value in observation.items() for i in range(np.size(value))
+                    ]
+                    truths.append(np.concatenate([np.ravel(value) for value in observation.values()]))
+                    frames.append(info["video_frame"])
+                    advance(1)
+    return np.stack(frames), np.array(truths, np.float32), names
+
+
+def read(
+    states: torch.Tensor, truth: torch.Tensor, epochs: int = 30
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """R² and median absolute error of each number of `truth` on the last quarter, learned from the first three."""
+    torch.manual_seed(0)
+    learned = len(states) * 3 // 4
+    mean, spread = truth[:learned].mean(0), truth[:learned].std(0) + 1e-6
+    wanted = (truth - mean) / spread
+    inputs, outputs, width = states.shape[1], truth.shape[1], 256
+    network = nn.Sequential(
+        nn.Linear(inputs, width),
+        nn.LayerNorm(width),
+        nn.ReLU(),
+        nn.Linear(width, width),
+        nn.ReLU(),
+        nn.Linear(width, outputs),
+    )
+    optimizer = torch.optim.AdamW(network.parameters(), weight_decay=0.01)
+    steps = epochs * learned // 128
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, 1e-3, total_steps=steps)
+    for _ in range(steps):
+        rows = torch.randint(learned, (128,))
+        loss = nn.functional.mse_loss(network(states[rows]), wanted[rows])
+        optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        optimizer.step()
+        schedule.step()
+    with torch.no_grad():
+        error = network(states[learned:]) - wanted[learned:]
+    r2 = 1 - error.square().mean(0) / wanted[learned:].var(0)
+    return r2.numpy(), (error.abs() * spread).median(0).values.numpy()
+
+
+@command()
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("task", help="from the catalogue, of DeepMind Control")
+    parser.add_argument("--demos", type=Path, required=True, help="directory of its demo sets")
+    parser.add_argument("--steps", type=int, default=2000, help="of the Alignment Phase")
+    parser.add_argument("--frames", type=int, default=8000, help="that the probe learns and is judged on")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    torch.set_num_threads(1)
+    config = preset("frames")
+    model = FrameRewardModel(config.reward.bootifol.frames, config.pictures.video_size, arguments.seed)
+    paths = find_demo_sets(arguments.demos)
+    expert, random = (DemoSet.open(paths[kind], verify=False) for kind in ("expert", "random"))
+    with progress("aligning", arguments.steps) as advance:
+        for _ in islice(model.align(expert, random), arguments.steps):
+            advance(1)
+    frames, truth, names = watched(arguments.task, arguments.frames)
+    r2, error = read(as_features(torch.from_numpy(model.states(frames))), torch.from_numpy(truth))
+    rows = [
+        (name, f"{a:.3f}", f"{b:.4f}", f"{c:.4f}")
+        for name, a, b, c in zip(names, r2, error, truth.std(0), strict=True)
+    ]
+    Console().print(markdown_table(("observation", "R²", "median error", "spread"), rows))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,17 @@
+"""The probe reads what is there, and nothing out of noise."""
+
+from __future__ import annotations
+
+import torch
+from benchmarks.probe import read
+
+
+def test_it_reads_what_states_tell_and_nothing_else() -> None:
+    random = torch.Generator().manual_seed(0)
+    states = torch.randn(2000, 6, generator=random)
+    told = states[:, :1] - 2 * states[:, 1:2]
+    unrelated = torch.randn(2000, 1, generator=random)
+    r2, error = read(states, 0.1 * torch.cat([told, unrelated], 1), epochs=15)
+    assert r2[0] > 0.95
+    assert r2[1] < 0.1
+    assert error[0] < 0.05 < error[1]
