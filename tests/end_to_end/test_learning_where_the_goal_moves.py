@@ -27,7 +27,7 @@ CONFIG = replace(
     threads=1,
     tensorboard=False,
     alignment=replace(DRAWN.alignment, gradient_steps=350),
-    interactive=replace(DRAWN.interactive, agent_steps=4500),
+    interactive=replace(DRAWN.interactive, agent_steps=3000),
     evaluation=replace(DRAWN.evaluation, every=10**9, sight_episodes=0),
 )
 
