@@ -33,10 +33,11 @@ CONFIG = replace(
 
 
 class BlindReward(FrameRewardModel):
-    """Rewards each frame for another's: the same numbers, and they say nothing of where the goal is."""
+    """Rewards every frame by chance, which says nothing of where the goal is."""
 
     def score(self, states: FrameStates) -> Rewards:
-        return np.random.default_rng(len(states)).permutation(super().score(states))
+        noise: Rewards = np.random.default_rng(len(states)).uniform(-1, 1, len(states)).astype(np.float32)
+        return noise
 
 
 @pytest.fixture(scope="module")
@@ -66,5 +67,5 @@ def test_a_policy_learns_to_reach_a_goal_that_moves_and_a_blind_reward_does_not_
     assert expert is not None
     learned = return_after_learning(demos, tmp_path / "seeing", blind=False)
     blind = return_after_learning(demos, tmp_path / "blind", blind=True)
-    assert learned > 0.6 * expert
-    assert blind < 0.3 * expert
+    assert learned > 0.6 * expert, (learned, blind)
+    assert blind < 0.45 * expert, (learned, blind)
