@@ -68,4 +68,4 @@ def test_a_policy_learns_to_reach_a_goal_that_moves_and_a_blind_reward_does_not_
     learned = return_after_learning(demos, tmp_path / "seeing", blind=False)
     blind = return_after_learning(demos, tmp_path / "blind", blind=True)
     assert learned > 0.6 * expert, (learned, blind)
-    assert blind < 0.45 * expert, (learned, blind)
+    assert blind < 0.3 * expert, (learned, blind)
