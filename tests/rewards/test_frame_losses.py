@@ -65,7 +65,6 @@ def test_the_agents_frames_lose_only_what_they_show_more_often_than_the_expert(
     assert found == pytest.approx(least, abs=0.003)
 
 
-def test_rewards_are_chances_or_cut_logits() -> None:
+def test_rewards_are_cut_logits() -> None:
     logits = torch.tensor([-20.0, 0.0, 2.5, 20.0])
-    assert losses.reward(logits, "logit").tolist() == [-1.0, 0.0, 0.5, 1.0]
-    assert losses.reward(logits, "chance")[1] == 0.5
+    assert losses.reward(logits).tolist() == [-1.0, 0.0, 0.5, 1.0]

@@ -29,10 +29,6 @@ class FrameConfig:
     agent_weight: float = 0.2
     """Weight of L_B, by which the agent's frames bootstrap the head in the Interactive Phase."""
 
-    reward: Literal["chance", "logit"] = "logit"
-    """What rewards a frame of logit x. chance: sigmoid(x), the chance that it is the expert's, in (0, 1). logit: x / 5,
-    cut at -1 and 1, which still rises where the head is sure."""
-
     temperature: float = 0.1
     """tau of L_E and L_T."""
 

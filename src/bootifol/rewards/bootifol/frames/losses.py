@@ -80,13 +80,10 @@ def contrast(anchors: torch.Tensor, positives: torch.Tensor, temperature: float)
     return torch.stack(ways).mean()
 
 
-def reward(logits: torch.Tensor, kind: str) -> torch.Tensor:
-    """What a frame gets, float32 of the logits' shape.
+def reward(logits: torch.Tensor) -> torch.Tensor:
+    """What a frame gets: `x / 5`, cut at -1 and 1, float32 of the logits' shape. It still rises where the head is sure.
 
     Args:
         logits: x.
-        kind: chance `sigmoid(x)`, or logit `x / 5`, cut at -1 and 1.
     """
-    if kind == "chance":
-        return torch.sigmoid(logits.float())
     return (logits.float() / 5).clamp(-1.0, 1.0)

@@ -124,7 +124,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         """Rewards float32 `[N]` of frames by their states int8 `[N, Z]`."""
         with self._evaluating():
             logits = self.networks.logits(as_features(self._on_device(states)))
-            return to_host(losses.reward(logits, self.config.reward))
+            return to_host(losses.reward(logits))
 
     def states(self, frames: Frames) -> FrameStates:
         """What the eyes make of frames uint8 `[N, S, S, 3]`: int8 `[N, Z]`."""
