@@ -211,3 +211,49 @@ def test_without_half_good_videos_the_reward_is_judged_by_random_ones(tmp_path: 
     (told,) = [finding for finding in findings(read_run(run)) if "unseen expert" in finding.text]
     assert "above a random one in 90% of pairs (a coin: 50%); before the agent acted it was 80%" in told.text
     assert told.verdict == "fair"
+
+
+@pytest.mark.parametrize(
+    ("budget", "wanted", "told"),
+    [
+        (None, 500, None),  # nothing limits the time
+        (600.0, 40, None),  # half of them were taken
+        (
+            600.0,
+            500,
+            "The time was too short: alignment took 20 of its 500 gradient steps and the agent had no update. "
+            "Give a longer --time-budget, or a quicker --preset.",
+        ),
+    ],
+)
+def test_what_time_cut_off_comes_first(
+    tmp_path: Path, budget: float | None, wanted: int, told: str | None
+) -> None:
+    directory = write_run(
+        tmp_path / "run", time_budget=budget, losses={"total": [1, 1]}, alignment__gradient_steps=wanted
+    )
+    if wanted == 40:
+        with (directory / "metrics.jsonl").open("a") as file:
+            file.write(
+                '{"phase": "interactive", "agent_steps": 1000, "seconds": 9, "agent/critic_loss": 1.0}\n'
+            )
+    first = findings(read_run(directory))[0]
+    if told is None:
+        assert "too short" not in first.text
+    else:
+        assert first == Finding("poor", told)
+
+
+def test_a_cloning_phase_that_was_cut_off_is_told(tmp_path: Path) -> None:
+    clones = {"share": 0.25, "inverse_dynamics_updates": 10, "cloning_updates": 10}
+    directory = write_run(tmp_path / "run", time_budget=600.0, demonstrations=clones)
+    with (directory / "metrics.jsonl").open("a") as file:
+        file.write('{"phase": "cloning", "gradient_step": 9, "seconds": 5, "agent/cloning_loss": 1.0}\n')
+        file.write('{"phase": "interactive", "agent_steps": 1000, "seconds": 9, "agent/critic_loss": 1.0}\n')
+    first = findings(read_run(directory))[0]
+    assert first.verdict == "poor" and "cloning took 9 of its 20 gradient steps" in first.text
+
+
+def test_a_policy_worse_than_random_is_told_so(tmp_path: Path) -> None:
+    first = findings(read_run(write_run(tmp_path / "run", returns=(-20.0, -10.0))))[0]
+    assert first.verdict == "poor" and first.text.endswith("It is worse than random actions.")

@@ -11,11 +11,19 @@ import numpy as np
 import pytest
 from tiny_runs import WITH_DEMONSTRATIONS, new_run
 
+from bootifol.agents.config import DrQv2Config
+from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.errors import BootifolError
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.training.budget import Budget, Counters
-from bootifol.training.cloning import cloning_due, one_cycle, steps_of_a_phase
+from bootifol.training.cloning import (
+    cloning_due,
+    cloning_in_progress,
+    cloning_phase,
+    one_cycle,
+    steps_of_a_phase,
+)
 from bootifol.training.demonstrations import DemonstrationConfig, Demonstrations
 from bootifol.types import Arrays, Batch, Episode, FrameBatch, Frames, Metrics, Video, VideoSource
 
@@ -218,6 +226,34 @@ def test_a_learning_rate_rises_and_falls_in_every_phase() -> None:
     assert (np.diff(shares[: highest + 1]) > 0).all()
     assert (np.diff(shares[highest:]) < 0).all()
     assert 0 < one_cycle(0, 1) <= 1  # a phase of a single step
+
+
+def test_where_time_is_further_on_it_moves_the_learning_rate() -> None:
+    assert one_cycle(10, 1000, 0.5) == pytest.approx(one_cycle(499, 999))
+    assert one_cycle(700, 1000, 0.5) == one_cycle(700, 1000)
+
+
+def test_a_cloning_phase_ends_with_its_share_of_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each step takes a second: a third of 30 for the inverse dynamics, 6 videos, the rest for the clone."""
+
+    class OneSecond:
+        def lap(self) -> float:
+            return 1.0
+
+    monkeypatch.setattr("bootifol.training.cloning.Stopwatch", OneSecond)
+    config = replace(CONFIG, inverse_dynamics_updates=500, cloning_updates=500)
+    demonstrations, rng = make_demonstrations(config), np.random.default_rng(0)
+    agent = DrQv2(DrQv2Config(encoder="strided", hidden_dim=16, batch_size=8), SIZE, 2, 1, seed=0)
+    counters = Counters(agent_steps=1920, cloning_seconds=7.0)
+    budget = Budget(agent_steps=1000, seconds=100.0, cloning_share=0.3)
+    steps = [*cloning_phase(agent, demonstrations, agent_steps(), CountingReward(), rng, budget, counters)]
+    learned = [
+        sum(name in metrics for metrics in steps) for name in ("inverse_dynamics/loss", "agent/cloning_loss")
+    ]
+    assert learned == [11, 31 - 11 - 6]
+    assert counters.cloning_steps == steps_of_a_phase(demonstrations)
+    assert counters.cloning_gradient_steps == sum(learned)
+    assert not cloning_in_progress(demonstrations, counters)
 
 
 def test_warm_up_actions_are_held(tmp_path: Path, demos: Path) -> None:

@@ -1,16 +1,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from bootifol.errors import BootifolError
-from bootifol.presets import CPU, PAPER, PRESETS
+from bootifol.presets import CPU, DEMO, DRAWN, PAPER, PRESETS
 from bootifol.reports.run_files import read_run
 from bootifol.training import run_config
 from bootifol.training.config import TrainingConfig
-from bootifol.training.run_config import RunConfig
+from bootifol.training.run_config import RunConfig, require_time_to_act
 
 
 @pytest.mark.parametrize("preset", list(PRESETS))
@@ -81,6 +82,14 @@ def test_a_learning_rate_lowered_by_hand_is_the_runs(tmp_path: Path) -> None:
     data["config"]["agent"]["learning_rate"] = 0.00001
     path.write_text(json.dumps(data))
     assert RunConfig.read(tmp_path).training.agent.learning_rate == 1e-5
+
+
+def test_acting_gets_half_of_a_time_budget() -> None:
+    require_time_to_act(DEMO)
+    require_time_to_act(DRAWN)  # nothing is cloned
+    greedy = replace(DEMO, alignment=replace(DEMO.alignment, time_share=0.26))
+    with pytest.raises(BootifolError, match="leave less than half for acting and learning"):
+        require_time_to_act(greedy)
 
 
 def test_the_paper_preset_is_the_papers_table() -> None:

@@ -14,7 +14,7 @@ from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import EvaluationRow, RankingRow
 from bootifol.reports.final_return import FinalReturn, final_return
 from bootifol.reports.names import hears_reward
-from bootifol.reports.run_files import CLONING, INTERACTIVE, RunFiles
+from bootifol.reports.run_files import ALIGNMENT, CLONING, INTERACTIVE, RunFiles
 
 Verdict = Literal["good", "fair", "poor"]
 Direction = Literal["up", "down", "unclear"]
@@ -25,6 +25,9 @@ FEWEST_EVALUATIONS = 8
 
 FEWEST_STARTS = 5
 """Of evaluation episodes at either end: a bootstrap interval of fewer is no interval."""
+
+LEAST_OF_A_PHASE = 0.5
+"""Share of its gradient steps below which a phase was cut off."""
 
 FEWEST_REWARDS = 20
 """Records of the learned reward; a quarter is five."""
@@ -58,8 +61,42 @@ def scores_or_none(rows: Sequence[RankingRow]) -> RankingScores | None:
 
 def findings(run: RunFiles) -> list[Finding]:
     """What the run learned: its policy, its reward, what cloning did, and whether return followed reward."""
-    found = [_policy(run), _reward(run), _cloning(run), _following(run), _showcase(run)]
+    found = [_cut_off(run), _policy(run), _reward(run), _cloning(run), _following(run), _showcase(run)]
     return [finding for finding in found if finding is not None]
+
+
+def _cut_off(run: RunFiles) -> Finding | None:
+    """What time left too little of: a phase, or all of the agent's updates."""
+    cut = []
+    for phase, wanted in _gradient_steps_wanted(run).items():
+        curves = [curve for (of_phase, _), curve in run.curves.items() if of_phase == phase and len(curve)]
+        done = max((int(curve.steps[-1]) for curve in curves), default=wanted)
+        if done < LEAST_OF_A_PHASE * wanted:
+            cut.append(f"{phase} took {done:,} of its {wanted:,} gradient steps")
+    if (
+        run.agent_steps
+        and run.curve(INTERACTIVE, "agent/critic_loss") is None
+        and run.time_budget is not None
+    ):
+        cut.append("the agent had no update")
+    if not cut or run.time_budget is None:
+        return None
+    text = f"The time was too short: {' and '.join(cut)}."
+    return Finding("poor", f"{text} Give a longer --time-budget, or a quicker --preset.")
+
+
+def _gradient_steps_wanted(run: RunFiles) -> dict[str, int]:
+    """By phase, as far as the configuration tells: of the Alignment Phase and of one Cloning Phase."""
+
+    def field(part: str, name: str) -> float:
+        value = run.config.get(part, {}).get(name, 0)
+        return value if isinstance(value, int | float) else 0
+
+    wanted = {ALIGNMENT: field("alignment", "gradient_steps")}
+    if field("demonstrations", "share") > 0:
+        updates = ("inverse_dynamics_updates", "cloning_updates")
+        wanted[CLONING] = sum(field("demonstrations", name) for name in updates)
+    return {phase: int(count) for phase, count in wanted.items()}
 
 
 def _policy(run: RunFiles) -> Finding | None:
@@ -80,6 +117,8 @@ def _policy(run: RunFiles) -> Finding | None:
         f"The policy returns {short_number(final.environment_return.mean)} in {final.episode_steps} agent steps{ends}: "
         f"{_percent(value)} of the way from random to expert{solved}."
     )
+    if value < 0:
+        text += " It is worse than random actions."
     return Finding(_verdict(value, good=0.8, fair=0.2), text)
 
 

@@ -43,7 +43,7 @@ from bootifol.training.components import (
 )
 from bootifol.training.config import TrainingConfig
 from bootifol.training.interruption import Stopped
-from bootifol.training.run_config import RunConfig
+from bootifol.training.run_config import RunConfig, require_time_to_act
 from bootifol.training.run_directory import (
     require_resumable,
     require_same_videos,
@@ -111,6 +111,8 @@ def train_policy(
         time_budget=time_budget,
         training=config or preset_named(preset, method),
     )
+    if time_budget is not None:
+        require_time_to_act(run.training)
     with output_may_fail(), writing_run(directory):
         require_unused(directory)
         learner = Run(run, directory, _console())

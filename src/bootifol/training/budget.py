@@ -29,7 +29,7 @@ class Counters:
     cloning_began_at: int = 0
     """Agent steps when the last Cloning Phase began."""
     cloning_steps: int = 0
-    """In all Cloning Phases (`cloning.steps_of_a_phase`)."""
+    """In all Cloning Phases (`cloning.steps_of_a_phase`), those included that time left no room for."""
     cloning_gradient_steps: int = 0
     """Those of them that learn: of the inverse dynamics and of the clone."""
     alignment_seconds: float = 0.0
@@ -38,6 +38,8 @@ class Counters:
     """Wall-clock time spent in the Interactive Phase, evaluations included."""
     cloning_seconds: float = 0.0
     """Wall-clock time spent in Cloning Phases."""
+    cloning_seconds_before: float = 0.0
+    """Of that, what was spent before the last Cloning Phase began."""
 
     def as_json(self) -> dict[str, float]:
         return asdict(self)
@@ -81,10 +83,20 @@ class Budget:
     alignment_share: float = 0.0
     """Largest share of `seconds` for the Alignment Phase."""
 
+    cloning_share: float = 0.0
+    """Largest share of `seconds` for one Cloning Phase."""
+
     def alignment_ended(self, counters: Counters) -> bool:
         if counters.alignment_steps >= self.alignment_steps:
             return True
         return self.seconds is not None and counters.alignment_seconds >= self.alignment_share * self.seconds
+
+    def cloning_passed(self, counters: Counters) -> float:
+        """What share of the last Cloning Phase's time has passed, 1 where it is over; without a limit 0, always."""
+        if self.seconds is None:
+            return 0.0
+        passed = counters.cloning_seconds - counters.cloning_seconds_before
+        return min(passed / max(self.cloning_share * self.seconds, 1e-9), 1.0)
 
     def scheduled_steps(self, counters: Counters) -> int:
         """Where schedules stand, in agent steps from 0 to N_π."""

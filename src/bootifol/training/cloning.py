@@ -18,6 +18,9 @@ from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.demonstrations import Demonstrations
 from bootifol.types import StepMetrics
 
+INVERSE_DYNAMICS_TIME = 1 / 3
+"""Share of a Cloning Phase's time, where it is limited, by which the inverse dynamics has learned."""
+
 
 def cloning_phase(
     agent: DrQv2,
@@ -36,7 +39,7 @@ def cloning_phase(
         agent_replay: the agent's own steps.
         reward_model: rewards the expert videos.
         rng: draws batches and references.
-        budget: a run whose time is over ends the phase.
+        budget: where it limits the time, the phase ends with its share of it, and a run whose time is over ends it.
         counters: those of Cloning Phases are kept up to date.
 
     Yields:
@@ -50,30 +53,39 @@ def cloning_phase(
     if not cloning_in_progress(demonstrations, counters):
         counters.cloning_phases += 1
         counters.cloning_began_at = counters.agent_steps
+        counters.cloning_seconds_before = counters.cloning_seconds
     earlier = (counters.cloning_phases - 1) * steps_of_a_phase(demonstrations)
     while not budget.ended(counters) and cloning_in_progress(demonstrations, counters):
         metrics: StepMetrics = {}
-        if (step := counters.cloning_steps - earlier) < inferring:
-            rate = one_cycle(step, inferring) * config.inverse_dynamics_learning_rate
+        step, time_passed = counters.cloning_steps - earlier, budget.cloning_passed(counters)
+        if step < inferring:
+            part_passed = min(time_passed / INVERSE_DYNAMICS_TIME, 1.0)
+            rate = one_cycle(step, inferring, part_passed) * config.inverse_dynamics_learning_rate
             policy_steps = counters.agent_steps - agent.config.warm_up_steps
             metrics = demonstrations.learn_inverse_dynamics(agent_replay, policy_steps, rng, rate)
+            last = inferring
         elif step < cloning:
             demonstrations.infer(step - inferring, reward_model, rng)
+            part_passed, last = 0.0, cloning
         else:
-            rate = one_cycle(step - cloning, config.cloning_updates) * config.cloning_learning_rate
+            part_passed = max((time_passed - INVERSE_DYNAMICS_TIME) / (1 - INVERSE_DYNAMICS_TIME), 0.0)
+            rate = one_cycle(step - cloning, config.cloning_updates, part_passed)
+            rate *= config.cloning_learning_rate
             metrics = agent.clone(demonstrations.sample(agent.config.batch_size, rng), rate)
-        counters.cloning_steps += 1
+            last = steps_of_a_phase(demonstrations)
+        counters.cloning_steps = earlier + (step + 1 if part_passed < 1 else last)
         counters.cloning_gradient_steps += bool(metrics)
         counters.cloning_seconds += watch.lap()
         yield metrics
 
 
-def one_cycle(done: int, steps: int) -> float:
+def one_cycle(done: int, steps: int, time_passed: float = 0.0) -> float:
     """What share of its highest value a learning rate has at gradient step `done` of `steps`.
 
-    It rises for a twentieth of them and falls to 0 with half a cosine, so that the parameters come to rest.
+    It rises for a twentieth of them and falls to 0 with half a cosine, so that the parameters come to rest; where the
+    time for them is further on than they are, by that.
     """
-    passed = (done + 1) / (steps + 1)
+    passed = max((done + 1) / (steps + 1), time_passed)
     rise = 0.05
     if passed < rise:
         return passed / rise

@@ -184,6 +184,21 @@ def _shift(run: RunConfig) -> int:
     return run.training.agent.random_shift if reads_pictures(run) else 0
 
 
+def build_replay(run: RunConfig, reward_model: RewardModel, capacity: int, action_dim: int) -> ReplayBuffer:
+    """An empty replay of so many frames, of what the run's agent sees."""
+    agent, pictures = run.training.agent, run.training.pictures
+    return ReplayBuffer(
+        capacity,
+        pictures.agent_size,
+        action_dim,
+        pictures.stack,
+        agent.n_step,
+        agent.discount,
+        _shift(run),
+        _state_size(run, reward_model),
+    )
+
+
 def demonstrated_videos(run: RunConfig, expert: VideoSource) -> int:
     """How many expert videos become the agent's experience; 0 where the configuration wants none."""
     config = run.training.demonstrations
@@ -196,17 +211,8 @@ def build_demonstrations(
     """Expert videos as experience."""
     state_size = _state_size(run, reward_model)
     config, agent, pictures = run.training.demonstrations, run.training.agent, run.training.pictures
-    count = demonstrated_videos(run, expert)
-    replay = ReplayBuffer(
-        count * len(expert[0].frames),
-        pictures.agent_size,
-        action_dim,
-        pictures.stack,
-        agent.n_step,
-        agent.discount,
-        _shift(run),
-        state_size,
-    )
+    frames = demonstrated_videos(run, expert) * len(expert[0].frames)
+    replay = build_replay(run, reward_model, frames, action_dim)
     inverse_dynamics = InverseDynamics(
         agent.encoder,
         pictures.agent_size,
@@ -272,16 +278,7 @@ def build_components(
         reward_model=reward_model,
         backbone=learners.backbone,
         agent=learners.agent,
-        replay=ReplayBuffer(
-            config.agent.replay_capacity,
-            pictures.agent_size,
-            action_dim,
-            pictures.stack,
-            config.agent.n_step,
-            config.agent.discount,
-            _shift(run),
-            state_size,
-        ),
+        replay=build_replay(run, reward_model, config.agent.replay_capacity, action_dim),
         agent_videos=AgentVideos(*ring, failures_share=config.interactive.failures_share),
         demonstrations=build_demonstrations(run, expert, action_dim, reward_model) if demonstrated else None,
     )

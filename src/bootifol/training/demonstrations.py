@@ -66,7 +66,11 @@ class DemonstrationConfig:
     """Of Adam at its highest, rising and falling likewise."""
 
     phases: int = 3
-    """Cloning Phases of a run. One that a time budget would cut off does not begin."""
+    """Cloning Phases of a run."""
+
+    time_share: float = 0.25
+    """With a time budget, the largest share of it that all Cloning Phases together may take, each as much as any other:
+    what is left of its gradient steps then is left out."""
 
     repeat_every: int = 1500
     """Agent steps from one Cloning Phase to the next: steps of a policy that moves like the expert teach the inverse
@@ -78,7 +82,7 @@ class DemonstrationConfig:
     def __post_init__(self) -> None:
         of_self = partial(fields_of, "demonstrations", self)
         require_below_one(**of_self("share"))
-        require_share(**of_self("moving_share", "history_dropout", "policy_share"))
+        require_share(**of_self("moving_share", "history_dropout", "policy_share", "time_share"))
         counts = ("videos", "inverse_dynamics_updates", "phases", "repeat_every", "batch_size")
         require_at_least(1, **of_self(*counts))
         require_at_least(0, **of_self("cloning_updates"))

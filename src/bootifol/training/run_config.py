@@ -27,6 +27,8 @@ from bootifol.training.config import TrainingConfig
 from bootifol.training.provenance import versions, videos_in
 
 FORMAT = 1
+MOST_BEFORE_ACTING = 0.5
+"""Of a time budget, for alignment and cloning together."""
 _Config = TypeVar("_Config")
 
 
@@ -137,6 +139,20 @@ class RunConfig:
         if needs_method or run.training.agent.observations == "encodings":
             require_trust(path, "method", run.method, trust)
         return run
+
+
+def require_time_to_act(config: TrainingConfig) -> None:
+    """Acting and learning get half of a time budget at least, in runs that begin.
+
+    Raises:
+        BootifolError: the shares of the other phases leave less.
+    """
+    alignment, cloning = config.alignment.time_share, config.demonstrations.time_share
+    if config.demonstrations.share > 0 and alignment + cloning > MOST_BEFORE_ACTING:
+        raise BootifolError(
+            f"alignment.time_share {alignment:g} and demonstrations.time_share {cloning:g} of the time budget leave "
+            "less than half for acting and learning: lower one of them"
+        )
 
 
 def from_json(kind: type[_Config], data: Any, path: Path) -> _Config:

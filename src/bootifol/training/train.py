@@ -35,6 +35,7 @@ from bootifol.training.checkpoint import (
 )
 from bootifol.training.cloning import cloning_phase, steps_of_a_phase
 from bootifol.training.components import build_components, build_environment, build_learners, open_demos
+from bootifol.training.forecast import forecast
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.interruption import Interruption, Stopped
 from bootifol.training.measurements import Measurements
@@ -83,6 +84,7 @@ class Run:
             self.run.time_budget,
             config.alignment.gradient_steps,
             config.alignment.time_share,
+            config.demonstrations.time_share / config.demonstrations.phases,
         )
         self.interactive = InteractivePhase(
             environment=self.environment,
@@ -199,6 +201,8 @@ class Run:
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()
+        if rest := averages.pop():
+            self._log("alignment", "gradient_step", self.counters.alignment_steps, rest)
         if not self.counters.alignment_steps:
             self.console.print("nothing to align: this method's reward learns nothing before the agent acts")
         return True
@@ -223,12 +227,12 @@ class Run:
         with progress("cloning the videos", total, done, "steps") as advance:
             for metrics in phase:
                 averages.add(metrics)
-                done += 1
+                before, done = done, (self.counters.cloning_steps - 1) % total + 1
                 if (done % log_every == 0 or done == total) and (means := averages.pop()):
                     self._log("cloning", "gradient_step", self.counters.cloning_gradient_steps, means)
                     shown |= means
                 self.counters.to_evaluate = int(done == total)
-                advance(1, **shown)
+                advance(done - before, **shown)
                 if interruption.requested:
                     return self._stop()
                 self._checkpoint_if_due()
@@ -246,6 +250,9 @@ class Run:
 
     def _interact(self, interruption: Interruption) -> bool:
         counters = self.counters
+        if self.run.time_budget is not None and counters.agent_steps == 0:
+            bought = forecast(self.run, self.components, self.budget, counters)
+            self.console.print(bought.in_words(), style="bold red" if bought.little else None)
         self._evaluate_if_due()
         while self.interactive.in_progress or not self.budget.ended(counters):
             phase = self._clone if self.interactive.cloning_due else self._act_and_learn
