@@ -247,16 +247,16 @@ FRAMES = _seeing(
 )
 FRAMES = replace(
     FRAMES,
-    alignment=AlignmentConfig(gradient_steps=2000),
+    alignment=AlignmentConfig(gradient_steps=1000),
     interactive=InteractiveConfig(
-        agent_steps=200_000, reward_update_every=8, reward_updates_until=200_000, agent_videos=1000
+        agent_steps=200_000, reward_update_every=8, reward_updates_until=12_000, agent_videos=1000
     ),
     demonstrations=DemonstrationConfig(),
     evaluation=replace(CPU.evaluation, every=10_000),
 )
 """`cpu` with a reward from single frames, an agent that reads what its eyes make of them, and nothing cloned."""
 
-DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(late_from=0.0), replay_capacity=20_000)
+DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(late_from=0.0, temperature=0.1, moments=3), replay_capacity=20_000)
 DRAWN = replace(
     DRAWN,
     alignment=AlignmentConfig(gradient_steps=1000, time_share=0.5),

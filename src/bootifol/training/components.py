@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +135,11 @@ def build_agent(
 def reads_pictures(run: RunConfig) -> bool:
     """Whether the agent's own networks read the pictures, and not what the reward model makes of them."""
     return run.training.agent.observations == "pictures"
+
+
+def compares_in_time(run: RunConfig) -> bool:
+    """Whether the reward compares an episode with whole videos, which must be as long then; single frames need not."""
+    return run.method not in ("bootifol", "environment") or run.training.reward.bootifol.reward != "frames"
 
 
 def _states(run: RunConfig, reward_model: RewardModel | None) -> StackedStates:
@@ -366,7 +371,10 @@ def _open(path: Path, run: RunConfig, unverified: list[DemoSet]) -> DemoSet:
         demo_set.verify()
     else:
         unverified.append(demo_set)
-    found = differences(demo_set.manifest, run.resolved_task(), run.training.pictures)
+    task = run.resolved_task()
+    if not compares_in_time(run):
+        task = replace(task, episode_steps=min(task.episode_steps, demo_set.manifest.frames - 1))
+    found = differences(demo_set.manifest, task, run.training.pictures)
     if found:
         raise BootifolError(f"the videos in {path} do not fit this run: {'; '.join(found)}")
     return demo_set

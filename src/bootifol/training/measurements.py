@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -149,8 +150,11 @@ class Measurements:
         videos: dict[str, list[Video]] = dict(self._demos.held_out)
         agent_videos = self._components.agent_videos
         if len(agent_videos):
-            count = self._config.held_out_videos
-            videos["agent"] = agent_videos.newest(count)
+            # Sums are compared, so of as many frames as the held-out videos have, where the agent's have more.
+            frames = len(self._demos.held_out["expert"][0].frames) if "expert" in videos else None
+            videos["agent"] = [
+                _cut(video, frames) for video in agent_videos.newest(self._config.held_out_videos)
+            ]
         sees = self._sight()
         figures = {f"sight/{name}": value for name, value in sees.items()}
         rows = rank_videos(
@@ -216,3 +220,9 @@ class Measurements:
             self._counters.agent_steps,
         )
         write_showcase(self._directory, episodes, self._environment.metadata["render_fps"])
+
+
+def _cut(video: Video, frames: int | None) -> Video:
+    """Its first so many frames."""
+    features = None if video.features is None else video.features[:frames]
+    return replace(video, frames=video.frames[:frames], features=features)

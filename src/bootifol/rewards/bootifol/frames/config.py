@@ -29,11 +29,14 @@ class FrameConfig:
     agent_weight: float = 0.2
     """Weight of L_B, by which the agent's frames bootstrap the head in the Interactive Phase."""
 
-    temperature: float = 0.1
+    temperature: float = 0.05
     """tau of L_E and L_T."""
 
     videos_per_class: int = 16
-    """Videos of either class in a gradient step of the Alignment Phase, and six frames of each."""
+    """Videos of either class in a gradient step of the Alignment Phase."""
+
+    moments: int = 6
+    """Moments of each of them in it; of each, a frame and one next to it."""
 
     frames_per_class: int = 96
     """Frames of either class in a gradient step of the Interactive Phase."""
@@ -68,6 +71,6 @@ class FrameConfig:
         require_choices("frames", self)
         require_at_least(0, **of_self("frame_weight", "episode_weight", "time_weight", "shift", "noise"))
         require_at_least(1, **of_self("frames_per_class", "width", "hidden_dim"))
-        require_at_least(2, **of_self("videos_per_class"))
+        require_at_least(2, **of_self("videos_per_class", "moments"))
         require_positive(**of_self("temperature", "learning_rate", "head_learning_rate"))
         require_share(**of_self("random_share", "late_from"))

@@ -24,9 +24,6 @@ from bootifol.rewards.bootifol.frames.networks import FrameNetworks
 from bootifol.rewards.learned import LearnedRewardModel
 from bootifol.types import Arrays, FeatureSource, Frames, FrameStates, Metrics, Rewards, Video, VideoSource
 
-MOMENTS = 3
-"""Moments of a video in a gradient step of the Alignment Phase; of each, a frame and one next to it."""
-
 NEXT_TO = 2
 """Farthest frame, in agent steps, that counts as next to another, as in L_triplet."""
 
@@ -187,10 +184,10 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         with self._autocast():
             seen = self.networks.eyes(self._on_device(shifted)).float()
         # As coarse as the states that will be kept.
-        states = (seen + rounding(seen, self._rng)).unflatten(0, (len(frames), MOMENTS, 2))
+        states = (seen + rounding(seen, self._rng)).unflatten(0, (len(frames), config.moments, 2))
         of_episode, of_time = self.networks.views(states)
         expert_logits, other_logits = self.networks.logits(states).chunk(2)
-        of_expert = times[: config.videos_per_class].reshape(-1, MOMENTS, 2)
+        of_expert = times[: config.videos_per_class].reshape(-1, config.moments, 2)
         lateness = losses.lateness(self._on_device(of_expert), videos[0].shape[1], config.late_from)
         terms = {"frame": losses.frame_loss(expert_logits, other_logits, lateness)}
         if config.episode_weight > 0:
@@ -205,16 +202,17 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         return metrics
 
     def _draw_times(self, videos: int, length: int) -> NDArray[np.int64]:
-        """Frames `[videos, 2 * MOMENTS]` of each video: a moment, a frame next to it, the next moment, and so on."""
-        if length < MOMENTS + NEXT_TO:
+        """Frames `[videos, 2 * moments]` of each video: a moment, a frame next to it, the next moment, and so on."""
+        moments = self.config.moments
+        if length < moments + NEXT_TO:
             raise BootifolError(
-                f"the videos have {length} frames, but {MOMENTS + NEXT_TO} are needed to tell moments apart; "
-                "use longer videos"
+                f"the videos have {length} frames, but {moments + NEXT_TO} are needed to tell {moments} moments apart; "
+                "use longer videos, or a lower reward.bootifol.frames.moments"
             )
-        times = np.empty((videos, MOMENTS, 2), np.int64)
+        times = np.empty((videos, moments, 2), np.int64)
         for of_video in times:
-            of_video[:, 0] = self._rng.choice(length - NEXT_TO, MOMENTS, replace=False)
-        times[..., 1] = times[..., 0] + self._rng.integers(1, NEXT_TO + 1, (videos, MOMENTS))
+            of_video[:, 0] = self._rng.choice(length - NEXT_TO, moments, replace=False)
+        times[..., 1] = times[..., 0] + self._rng.integers(1, NEXT_TO + 1, (videos, moments))
         return times.reshape(videos, -1)
 
     def _shifted(self, frames: Frames) -> Frames:
