@@ -11,6 +11,8 @@ Control. Speeds, and angles that turn without end, cannot be told from one frame
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -28,6 +30,7 @@ from bootifol.networks.eyes import as_features
 from bootifol.presets import preset
 from bootifol.progress import progress
 from bootifol.reports.markdown import markdown_table
+from bootifol.rewards.bootifol.frames.config import FrameConfig
 from bootifol.rewards.bootifol.frames.model import FrameRewardModel
 from bootifol.tasks import make_environment, task_named
 from bootifol.types import Frames
@@ -102,6 +105,20 @@ def read(
     return r2.numpy(), (error.abs() * spread).median(0).values.numpy()
 
 
+def with_fields(config: FrameConfig, fields: Sequence[str]) -> FrameConfig:
+    """The configuration with other numbers, each given as NAME=NUMBER."""
+    for field in fields:
+        name, _, number = field.partition("=")
+        before = getattr(config, name, None)
+        if not isinstance(before, int | float):
+            raise BootifolError(f"--field {field}: the eyes have no number of that name; write NAME=NUMBER")
+        try:
+            config = replace(config, **{name: type(before)(number)})
+        except ValueError as error:
+            raise BootifolError(f"--field {field}: {number!r} is no number for {name}") from error
+    return config
+
+
 @command()
 def main() -> None:
     parser = argparse.ArgumentParser(
@@ -112,10 +129,17 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=2000, help="of the Alignment Phase")
     parser.add_argument("--frames", type=int, default=8000, help="that the probe learns and is judged on")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--field",
+        action="append",
+        default=[],
+        help="of the eyes, NAME=NUMBER, such as width=32; may be repeated",
+    )
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     config = preset("frames")
-    model = FrameRewardModel(config.reward.bootifol.frames, config.pictures.video_size, arguments.seed)
+    frames_config = with_fields(config.reward.bootifol.frames, arguments.field)
+    model = FrameRewardModel(frames_config, config.pictures.video_size, arguments.seed)
     paths = find_demo_sets(arguments.demos)
     expert, random = (DemoSet.open(paths[kind], verify=False) for kind in ("expert", "random"))
     with progress("aligning", arguments.steps) as advance:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
-from benchmarks.probe import read
+from benchmarks.probe import read, with_fields
+
+from bootifol.errors import BootifolError
+from bootifol.rewards.bootifol.frames.config import FrameConfig
 
 
 def test_it_reads_what_states_tell_and_nothing_else() -> None:
@@ -15,3 +19,11 @@ def test_it_reads_what_states_tell_and_nothing_else() -> None:
     assert r2[0] > 0.95
     assert r2[1] < 0.1
     assert error[0] < 0.05 < error[1]
+
+
+def test_fields_of_the_eyes_are_numbers() -> None:
+    changed = with_fields(FrameConfig(), ["width=32", "temperature=0.1"])
+    assert (changed.width, changed.temperature) == (32, 0.1)
+    for wrong in ("width=wide", "breadth=32", "precision=bf16", "width"):
+        with pytest.raises(BootifolError, match=f"--field {wrong}"):
+            with_fields(FrameConfig(), [wrong])
