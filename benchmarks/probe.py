@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -113,7 +114,8 @@ def with_fields(config: FrameConfig, fields: Sequence[str]) -> FrameConfig:
         if not isinstance(before, int | float):
             raise BootifolError(f"--field {field}: the eyes have no number of that name; write NAME=NUMBER")
         try:
-            config = replace(config, **{name: type(before)(number)})
+            changes: dict[str, Any] = {name: type(before)(number)}
+            config = replace(config, **changes)
         except ValueError as error:
             raise BootifolError(f"--field {field}: {number!r} is no number for {name}") from error
     return config
