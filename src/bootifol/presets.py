@@ -249,7 +249,7 @@ FRAMES = replace(
     FRAMES,
     alignment=AlignmentConfig(gradient_steps=1000),
     interactive=InteractiveConfig(
-        agent_steps=200_000, reward_update_every=8, reward_updates_until=12_000, agent_videos=1000
+        agent_steps=200_000, reward_update_every=8, reward_updates_until=48_000, agent_videos=1000
     ),
     demonstrations=DemonstrationConfig(),
     evaluation=replace(CPU.evaluation, every=10_000),
@@ -259,7 +259,9 @@ FRAMES = replace(
 episodes are twice as long as the paper's: single frames need no video that is as long, and an agent must have seen what
 comes after it got there (docs/results/frames.md)."""
 
-DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(late_from=0.0, temperature=0.1, moments=3), replay_capacity=20_000)
+DRAWN = _seeing(
+    DRAWN_PIXELS, FrameConfig(late_from=0.0, temperature=0.1, moments=3, noise=0.05), replay_capacity=20_000
+)
 DRAWN = replace(
     DRAWN,
     alignment=AlignmentConfig(gradient_steps=1000, time_share=0.5),
