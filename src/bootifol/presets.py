@@ -253,11 +253,8 @@ FRAMES = replace(
     ),
     demonstrations=DemonstrationConfig(),
     evaluation=replace(CPU.evaluation, every=10_000),
-    episode_steps=120,
 )
-"""`cpu` with a reward from single frames, an agent that reads what its eyes make of them, and nothing cloned. Its
-episodes are twice as long as the paper's: single frames need no video that is as long, and an agent must have seen what
-comes after it got there (docs/results/frames.md)."""
+"""`cpu` with a reward from single frames, an agent that reads what its eyes make of them, and nothing cloned."""
 
 DRAWN = _seeing(
     DRAWN_PIXELS, FrameConfig(late_from=0.0, temperature=0.1, moments=3, noise=0.05), replay_capacity=20_000
