@@ -67,19 +67,17 @@ def findings(run: RunFiles) -> list[Finding]:
 
 def _cut_off(run: RunFiles) -> Finding | None:
     """What time left too little of: a phase, or all of the agent's updates."""
+    if run.time_budget is None:
+        return None
     cut = []
     for phase, wanted in _gradient_steps_wanted(run).items():
         curves = [curve for (of_phase, _), curve in run.curves.items() if of_phase == phase and len(curve)]
         done = max((int(curve.steps[-1]) for curve in curves), default=wanted)
         if done < LEAST_OF_A_PHASE * wanted:
             cut.append(f"{phase} took {done:,} of its {wanted:,} gradient steps")
-    if (
-        run.agent_steps
-        and run.curve(INTERACTIVE, "agent/critic_loss") is None
-        and run.time_budget is not None
-    ):
+    if run.agent_steps and run.curve(INTERACTIVE, "agent/critic_loss") is None:
         cut.append("the agent had no update")
-    if not cut or run.time_budget is None:
+    if not cut:
         return None
     text = f"The time was too short: {' and '.join(cut)}."
     return Finding("poor", f"{text} Give a longer --time-budget, or a quicker --preset.")
