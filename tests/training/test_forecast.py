@@ -17,7 +17,7 @@ from bootifol.training.forecast import Costs, Forecast, affordable_steps, foreca
 def test_steps_are_what_the_seconds_pay_for() -> None:
     config = replace(
         TINY,
-        agent=replace(TINY.agent, update_every=2),
+        agent=replace(TINY.agent, update_every=2, warm_up_steps=0),
         interactive=replace(
             TINY.interactive, agent_steps=1000, reward_updates_until=500, reward_update_every=10
         ),
@@ -27,6 +27,10 @@ def test_steps_are_what_the_seconds_pay_for() -> None:
     # At rest 0.01 and a half of 0.02; while the reward learns, in half the time, a tenth of 0.2 more.
     assert affordable_steps(costs, config, 100.0, evaluated=0) == 50 / 0.04 + 50 / 0.02
     assert affordable_steps(costs, config, 100.0, evaluated=200) == int(50 / 0.06 + 50 / 0.04)
+    # 1000 steps of a warm-up, in which nothing learns, are 10 of 110 seconds.
+    warming_up = replace(config, agent=replace(config.agent, warm_up_steps=1000))
+    assert affordable_steps(costs, warming_up, 110.0, evaluated=0) == 1000 + 50 / 0.04 + 50 / 0.02
+    assert affordable_steps(costs, warming_up, 5.0, evaluated=0) == 500
 
 
 def test_little_is_told_with_what_would_be_enough() -> None:

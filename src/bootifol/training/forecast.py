@@ -111,11 +111,13 @@ def affordable_steps(costs: Costs, config: TrainingConfig, seconds: float, evalu
     """
     interactive = config.interactive
     steps = 1 + evaluated / config.evaluation.every
+    warm_up = min(config.agent.warm_up_steps * costs.agent_step * steps, seconds)  # nothing learns yet
     at_rest = costs.agent_step * steps + costs.update / config.agent.update_every
     learning = at_rest + costs.reward_update / interactive.reward_update_every
     # Schedules are stretched over the time, so it is a share of the time in which the reward learns.
     share = min(interactive.reward_updates_until / max(interactive.agent_steps, 1), 1.0)
-    return int(seconds * (share / learning + (1 - share) / at_rest))
+    learned = (seconds - warm_up) * (share / learning + (1 - share) / at_rest)
+    return int(warm_up / (costs.agent_step * steps) + learned)
 
 
 def measured_costs(run: RunConfig, components: Components, counters: Counters) -> Costs:
