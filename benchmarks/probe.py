@@ -2,10 +2,10 @@
 
     python -m benchmarks.probe reacher_hard --demos demos/reacher_hard --steps 900
 
-The eyes learn from the videos, as in a run. Then random actions play, the network learns each number of the
-simulator's own observation from what the eyes make of the frame, and the table says how well it does on held-out
-episodes: R² (1 is exact, 0 knows nothing) and the median absolute error in the simulator's units. For tasks of DeepMind
-Control. Speeds, and angles that turn without end, cannot be told from one frame.
+The eyes learn from the videos, as in a run. Then the expert and all who fail plausibly play in turn, the network learns
+each number of the simulator's own observation (Meta-World: where hand, object and goal are) from what the eyes make of
+the frame, and the table says how well it does on held-out episodes: R² (1 is exact, 0 knows nothing) and the median
+absolute error in the simulator's units. Speeds, and angles that turn without end, cannot be told from one frame.
 """
 
 from __future__ import annotations
@@ -26,7 +26,11 @@ from torch import nn
 from benchmarks.command import command
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.envs.dm_control import DMControlSimulator
+from bootifol.envs.meta_world import MetaWorldSimulator
+from bootifol.envs.rollout import rollout
 from bootifol.errors import BootifolError
+from bootifol.experts import make_expert
+from bootifol.experts.failures import failures_of, make_failure
 from bootifol.networks.eyes import as_features
 from bootifol.presets import preset
 from bootifol.progress import progress
@@ -36,41 +40,50 @@ from bootifol.rewards.bootifol.frames.model import FrameRewardModel
 from bootifol.tasks import make_environment, task_named
 from bootifol.types import Frames
 
-HELD_ACTION = 10
-"""Largest number of agent steps of one random action."""
-
 KEPT = 0.25
 """Share of the frames that are kept: neighbors look alike."""
 
+PLACES = {"hand": slice(0, 3), "object": slice(4, 7), "goal": slice(36, 39)}
+"""Where they stand in Meta-World's observation, in meters."""
+
+
+def observed(simulator: Any) -> dict[str, float]:
+    """What the simulator's own observation says, number by number.
+
+    Raises:
+        BootifolError: the simulator has none that the probe can read.
+    """
+    if isinstance(simulator, DMControlSimulator):
+        named = dict(simulator.environment.task.get_observation(simulator.physics))
+    elif isinstance(simulator, MetaWorldSimulator):
+        named = {name: simulator.observation[where] for name, where in PLACES.items()}
+    else:
+        raise BootifolError("the probe reads tasks of DeepMind Control and Meta-World alone")
+    return {f"{name}[{i}]": float(x) for name, value in named.items() for i, x in enumerate(np.ravel(value))}
+
 
 def watched(task: str, count: int) -> tuple[Frames, NDArray[np.float32], list[str]]:
-    """Frames `[N, S, S, 3]` of random actions, the simulator's observations `[N, O]`, and the names of these."""
+    """Frames `[N, S, S, 3]` of the expert and of those who fail, the simulator's observations `[N, O]`, and the names
+    of these."""
     environment = make_environment(task, preset("frames").pictures, task_named(task).episode_steps)
-    simulator = environment.simulator
-    if not isinstance(simulator, DMControlSimulator):
-        raise BootifolError(f"{task} is no task of DeepMind Control, whose observations the probe reads")
+    performers = ["expert", *failures_of(task, environment)]
     rng = np.random.default_rng(0)
     frames: list[Frames] = []
-    truths = []
-    names: list[str] = []
-    with progress("random actions", count) as advance:
+    truths: list[dict[str, float]] = []
+    with progress("the expert and failures", count) as advance:
         episode = 0
         while len(frames) < count:
-            environment.reset(seed=10**7 + episode)
-            episode += 1
-            for step in range(environment.episode_steps):
-                if step == 0 or rng.random() < 2 / HELD_ACTION:
-                    action = rng.uniform(-1, 1, environment.action_space.shape or ()).astype(np.float32)
-                *_, info = environment.step(action)
+            kind, seed = performers[episode % len(performers)], 10**7 + episode
+            failing = kind != "expert"
+            act = make_failure(kind, task, environment, seed) if failing else make_expert(task, environment)
+            for step in rollout(environment, act, seed):
                 if rng.random() < KEPT and len(frames) < count:
-                    observation = simulator.environment.task.get_observation(simulator.physics)
-                    names = [
-                        f"{name}[{i}]" for name, value in observation.items() for i in range(np.size(value))
-                    ]
-                    truths.append(np.concatenate([np.ravel(value) for value in observation.values()]))
-                    frames.append(info["video_frame"])
+                    truths.append(observed(environment.simulator))
+                    frames.append(step.video_frame)
                     advance(1)
-    return np.stack(frames), np.array(truths, np.float32), names
+            episode += 1
+    values = [list(truth.values()) for truth in truths]
+    return np.stack(frames), np.array(values, np.float32), list(truths[0])
 
 
 def read(

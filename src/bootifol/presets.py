@@ -35,9 +35,9 @@ PresetName = Literal[
     "drawn_pixels",
 ]
 
-PAPER = TrainingConfig()
-"""The paper's hyperparameters, which are the defaults of every field; what the paper leaves open (frame drop, window,
-margin, warm-up, replay) is as in the authors' release (docs/bootifol.md)."""
+PAPER = TrainingConfig(pictures=PictureConfig(profile="full"))
+"""The paper's hyperparameters, which are the defaults of every field, on pictures of the simulator's own quality; what
+the paper leaves open (frame drop, window, margin, warm-up, replay) is as in the authors' release (docs/bootifol.md)."""
 
 CPU = TrainingConfig(
     pictures=PictureConfig(agent_size=64, video_size=64),
@@ -118,7 +118,7 @@ LONG = replace(
 updates and fewer of them (docs/performance.md)."""
 
 BACKBONE = TrainingConfig(
-    pictures=PictureConfig(video_size=224),
+    pictures=PictureConfig(video_size=224, profile="full"),
     reward=RewardConfig(BootifolConfig(backbone="google/efficientnet-b0")),
     interactive=InteractiveConfig(agent_videos=1500),
     episode_steps=50,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import torch
-from benchmarks.probe import read, with_fields
+from benchmarks.probe import read, watched, with_fields
 
 from bootifol.errors import BootifolError
 from bootifol.rewards.bootifol.frames.config import FrameConfig
@@ -27,3 +27,17 @@ def test_fields_of_the_eyes_are_numbers() -> None:
     for wrong in ("width=wide", "breadth=32", "precision=bf16", "width"):
         with pytest.raises(BootifolError, match=f"--field {wrong}"):
             with_fields(FrameConfig(), [wrong])
+
+
+@pytest.mark.parametrize(("task", "named"), [("reacher_hard", "to_target[0]"), ("plate_slide", "object[0]")])
+def test_frames_go_with_what_the_simulator_shows(task: str, named: str) -> None:
+    frames, truth, names = watched(task, 30)
+    assert frames.shape == (30, 64, 64, 3)
+    assert truth.shape == (30, len(names))
+    assert named in names
+    assert truth[:, names.index(named)].std() > 0
+
+
+def test_a_task_without_an_observation_is_a_sentence() -> None:
+    with pytest.raises(BootifolError, match="DeepMind Control and Meta-World"):
+        watched("drawn_reach", 5)

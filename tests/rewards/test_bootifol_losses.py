@@ -34,6 +34,12 @@ def test_autoencoder_loss_by_hand() -> None:
     assert losses.autoencoder_loss(picture, decoded).item() == pytest.approx((9 + 1) / 12)
 
 
+def test_autoencoder_loss_sums_the_pictures_of_a_whole_step_exactly() -> None:
+    decoded = torch.rand(1952, 3, 64, 64, generator=torch.Generator().manual_seed(0))
+    exact = decoded.double().square().mean().item()
+    assert losses.autoencoder_loss(torch.zeros(()), decoded).item() == pytest.approx(exact, rel=1e-5)
+
+
 def test_prediction_loss_by_hand() -> None:
     # One video of 4 states along two axes, predictions after frame 1 for states 2 and 3, tau = 1.
     states = torch.tensor([[[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]])
