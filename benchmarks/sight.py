@@ -4,7 +4,8 @@
 
 A row a measure (`evaluation/sight.py`): task, reward, videos, measure, value. Rewards: `bootifol` is the one that the
 presets take, `sequences` the paper's objective as the presets had it, and every other method by its name. Rows of the
-same task, reward and videos are replaced; the command prints a table of the task.
+same task, reward and videos are replaced; the command prints a table of the task. `--picture FILE.png` shows what it
+confuses: an episode of the expert above those failures that it rewards most.
 """
 
 from __future__ import annotations
@@ -22,11 +23,13 @@ from rich.console import Console
 from benchmarks.command import command
 from bootifol.demos.demo_set import DemoSet, VideoSubset, find_demo_sets
 from bootifol.errors import BootifolError
-from bootifol.evaluation.sight import Performance, perform, returns, sight
+from bootifol.evaluation.sight import Performance, failures, perform, returns, sight
 from bootifol.files import written_aside
 from bootifol.presets import preset
 from bootifol.progress import progress
+from bootifol.reports.film_strip import rewards_above_film_strips
 from bootifol.reports.markdown import markdown_table
+from bootifol.reports.style import require_png, save_png
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.references import draw_references
 from bootifol.rewards.registry import make_reward_model
@@ -64,12 +67,14 @@ def aligned(
 
 def judged(
     task: str, preset_name: str, model: RewardModel, expert: VideoSubset, episodes: int
-) -> list[Performance]:
-    """Everyone plays."""
+) -> tuple[list[Performance], list[Video]]:
+    """Everyone plays; the performances and their videos."""
     environment = make_environment(task, preset(preset_name).pictures, task_named(task).episode_steps)
     rng = np.random.default_rng(0)
+    videos: list[Video] = []
 
     def label(video: Video) -> Rewards:
+        videos.append(video)
         return model.label(video, draw_references(model, expert, rng))
 
     performances = []
@@ -77,7 +82,22 @@ def judged(
         for performance in perform(task, environment, label, episodes):
             performances.append(performance)
             advance(1)
-    return performances
+    return performances, videos
+
+
+def confused(performances: list[Performance], figures: Metrics) -> list[int]:
+    """An episode of the expert, the one of median learned return, and then of each of the three kinds that are told
+    from it worst the failure of highest learned return."""
+    _, learned = returns(performances)
+    names = np.array([performance.performer for performance in performances])
+    failing = failures(performances)
+    of_expert = np.flatnonzero(names == "expert")
+    against = {name.removeprefix("auc:"): value for name, value in figures.items() if name.startswith("auc:")}
+    chosen = [int(of_expert[np.argsort(learned[of_expert])[len(of_expert) // 2]])]
+    for kind in sorted(against, key=against.__getitem__)[:3]:
+        failed = np.flatnonzero((names == kind) & failing)
+        chosen.append(int(failed[np.argmax(learned[failed])]))
+    return chosen
 
 
 @command()
@@ -94,9 +114,12 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=5.0, help="longest Alignment Phase")
     parser.add_argument("--episodes", type=int, default=40, help="of each performer")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--picture", type=Path, help="PNG of what the reward confuses")
     parser.add_argument("--out", type=Path, required=True, help="CSV to write rows into")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
+    if arguments.picture:
+        require_png(arguments.picture)
     if not task_named(arguments.task).has_expert:
         raise BootifolError(
             f"{arguments.task} has no expert to compare failures with: choose one of `bootifol tasks`"
@@ -105,7 +128,7 @@ def main() -> None:
     model, expert = aligned(
         arguments.reward, chosen, arguments.demos, arguments.videos, arguments.minutes, arguments.seed
     )
-    performances = judged(arguments.task, chosen, model, expert, arguments.episodes)
+    performances, videos = judged(arguments.task, chosen, model, expert, arguments.episodes)
     true, learned = returns(performances)
     names = np.array([performance.performer for performance in performances])
     figures = sight(performances)
@@ -123,6 +146,11 @@ def main() -> None:
     console.print(
         ", ".join(f"{name} {value:.2f}" for name, value in figures.items() if not name.startswith("auc:"))
     )
+    if arguments.picture:
+        shown = confused(performances, figures)
+        console.print("from above: " + ", ".join(names[shown]))
+        strips = rewards_above_film_strips([(videos[i], performances[i].learned_rewards) for i in shown])
+        save_png(strips, arguments.picture)
     key = {"task": arguments.task, "reward": arguments.reward, "videos": arguments.name or str(len(expert))}
     write(arguments.out, key, figures)
 

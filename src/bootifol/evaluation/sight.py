@@ -69,20 +69,17 @@ def perform(
 def sight(performances: Sequence[Performance]) -> Metrics:
     """What the performances say, by name.
 
-    `auc:KIND`: the chance that an episode of the expert is rewarded above one of that kind that failed: whose true
-    return is at most halfway from the worst kind's to the expert's. Kinds that fail in fewer than a quarter of their
-    episodes are left out. `spearman`: rank correlation of learned
-    and true return over all episodes. `step_auc`, where the true reward of a step takes few values, half of them or
+    `auc:KIND`: the chance that an episode of the expert is rewarded above one of that kind that failed (`failures`).
+    Kinds that fail in fewer than a quarter of their episodes are left out. `spearman`: rank correlation of learned and
+    true return over all episodes. `step_auc`, where the true reward of a step takes few values, half of them or
     more 0: the chance that a step with half of the highest or more is rewarded above one with none.
     """
     true, learned = returns(performances)
     names = np.array([performance.performer for performance in performances])
-    kinds = list(dict.fromkeys(names))
-    means = {kind: float(true[names == kind].mean()) for kind in kinds}
-    halfway = (means["expert"] + min(means.values())) / 2
+    failing = failures(performances)
     figures = {}
-    for kind in kinds:
-        failed = (names == kind) & (true <= halfway)
+    for kind in dict.fromkeys(names):
+        failed = (names == kind) & failing
         if kind != "expert" and failed.sum() >= (names == kind).sum() / 4:
             figures[f"auc:{kind}"] = area_under_curve(learned[names == "expert"], learned[failed])
     rank = float(stats.spearmanr(learned, true).statistic)
@@ -93,6 +90,15 @@ def sight(performances: Sequence[Performance]) -> Metrics:
         on, off = of_steps[steps >= steps.max() / 2], of_steps[steps == 0]
         figures["step_auc"] = area_under_curve(on, off)
     return figures
+
+
+def failures(performances: Sequence[Performance]) -> NDArray[np.bool_]:
+    """Which of them failed, `[n]`: their true return is at most halfway from the worst kind's to the expert's."""
+    true, _ = returns(performances)
+    names = np.array([performance.performer for performance in performances])
+    means = {name: float(true[names == name].mean()) for name in set(names)}
+    failed: NDArray[np.bool_] = true <= (means["expert"] + min(means.values())) / 2
+    return failed
 
 
 def returns(performances: Sequence[Performance]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
