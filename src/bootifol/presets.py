@@ -127,17 +127,6 @@ BACKBONE = TrainingConfig(
 one N_train for everything, 375K; the authors' released configurations stop the encoders earlier, after 60K (Button
 Press), 112.5K (Plate Slide) and 350K agent steps (Drawer Close): `--interactive.reward-updates-until`."""
 
-DEMO = replace(
-    CPU,
-    agent=replace(CPU.agent, replay_capacity=20_000),
-    alignment=AlignmentConfig(gradient_steps=500, time_share=0.25),
-    interactive=replace(CPU.interactive, agent_videos=300),
-    demonstrations=replace(CPU.demonstrations, inverse_dynamics_updates=1500, cloning_updates=4000, phases=1),
-    evaluation=EvaluationConfig(every=2500, long_episodes=1, final_episodes=10),
-    checkpoint_minutes=5.0,
-)
-"""For `make demo`: `cpu` in minutes."""
-
 DRAWN_PIXELS = replace(
     CPU,
     pictures=PictureConfig(agent_size=32, video_size=32, stack=2),
@@ -239,6 +228,7 @@ FRAMES = _seeing(
     hidden_dim=256,
     batch_size=256,
     learning_rate=3e-4,
+    discount=0.95,
     replay_capacity=300_000,
     warm_up_steps=3000,
     exploration_start=1.0,
@@ -249,12 +239,21 @@ FRAMES = replace(
     FRAMES,
     alignment=AlignmentConfig(gradient_steps=1000),
     interactive=InteractiveConfig(
-        agent_steps=200_000, reward_update_every=8, reward_updates_until=48_000, agent_videos=1000
+        agent_steps=100_000, reward_update_every=8, reward_updates_until=48_000, agent_videos=1000
     ),
     demonstrations=DemonstrationConfig(),
     evaluation=replace(CPU.evaluation, every=10_000),
 )
 """`cpu` with a reward from single frames, an agent that reads what its eyes make of them, and nothing cloned."""
+
+DEMO = replace(
+    FRAMES,
+    alignment=AlignmentConfig(gradient_steps=700, time_share=0.3),
+    interactive=replace(FRAMES.interactive, agent_steps=60_000, agent_videos=500),
+    evaluation=EvaluationConfig(every=10_000, long_episodes=1, final_episodes=10),
+    checkpoint_minutes=5.0,
+)
+"""For `make demo`: `frames` in minutes."""
 
 DRAWN = _seeing(
     DRAWN_PIXELS, FrameConfig(late_from=0.0, temperature=0.1, moments=3, noise=0.05), replay_capacity=20_000
@@ -290,7 +289,7 @@ PRESETS: dict[PresetName, TrainingConfig] = {
 SEEING_METHODS = ("bootifol", "environment")
 """Methods whose reward has eyes that an agent can share."""
 
-WITHOUT_EYES = {"drawn": "drawn_pixels", "frames": "cpu"}
+WITHOUT_EYES = {"drawn": "drawn_pixels", "frames": "cpu", "demo": "cpu"}
 """What other methods get in place of a preset whose agent reads what the reward's eyes make of a frame."""
 
 

@@ -40,6 +40,20 @@ def test_the_expert_succeeds_from_every_start_within_an_episode(task: str) -> No
 
 
 @pytest.mark.parametrize("task", NAMES)
+def test_a_near_miss_is_one(task: str) -> None:
+    environment = environment_of(task)
+    environment.reset(seed=0)
+    true = environment.simulator.observation[meta_world.GOALS[task]].copy()
+    near = meta_world.near_miss(task, environment.simulator, np.random.default_rng(0))
+    assert 0.07 <= np.linalg.norm(near - true) <= 0.09
+    over = False
+    while not over:
+        _, _, _, over, info = environment.step(meta_world.script(task, environment.simulator)(near))
+        assert not info["success"]
+    environment.close()
+
+
+@pytest.mark.parametrize("task", NAMES)
 def test_toward_a_wrong_place_the_same_script_fails(task: str) -> None:
     environment = environment_of(task)
     simulator: Any = environment.simulator

@@ -64,6 +64,16 @@ def test_the_arm_reaches_its_goal_and_rests_there(wrong: bool) -> None:
 
 
 @pytest.mark.usefixtures("requires_rendering")
+def test_near_misses_of_reacher_are_beside_the_target_and_within_reach() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        angle, radius = rng.uniform(-np.pi, np.pi), rng.uniform(0.05, 0.2)
+        target = radius * np.array([np.cos(angle), np.sin(angle)])
+        place = reacher.near_miss(target, rng)
+        assert 0.04 <= np.hypot(*(place - target)) <= 0.06
+        assert np.hypot(*place) < 2 * reacher.LINK
+
+
 def test_the_wrong_place_is_wrong_in_real_episodes() -> None:
     environment = make_environment("reacher_hard", PictureConfig(8, 8, stack=1), 1)
     simulator = environment.simulator

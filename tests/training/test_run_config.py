@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bootifol.errors import BootifolError
-from bootifol.presets import CPU, DEMO, DRAWN, PAPER, PRESETS
+from bootifol.presets import CPU, DRAWN, PAPER, PRESETS
 from bootifol.reports.run_files import read_run
 from bootifol.training import run_config
 from bootifol.training.config import TrainingConfig
@@ -85,9 +85,9 @@ def test_a_learning_rate_lowered_by_hand_is_the_runs(tmp_path: Path) -> None:
 
 
 def test_acting_gets_half_of_a_time_budget() -> None:
-    require_time_to_act(DEMO)
+    require_time_to_act(CPU)
     require_time_to_act(DRAWN)  # nothing is cloned
-    greedy = replace(DEMO, alignment=replace(DEMO.alignment, time_share=0.26))
+    greedy = replace(CPU, alignment=replace(CPU.alignment, time_share=0.26))
     with pytest.raises(BootifolError, match="leave less than half for acting and learning"):
         require_time_to_act(greedy)
 

@@ -65,37 +65,44 @@ def make_behavior(behavior: Behavior, task_name: str, environment: gymnasium.Env
         if half_trained.exists():
             policy, simulator = StatePolicy.load(half_trained), _simulator(environment)
             return lambda observation: policy(simulator.state())
-        controller, wrong_goal = script_of(task_name, environment)
-        return HalfGood(controller, environment, seed, wrong_goal)
+        controller, wrong_goals = script_of(task_name, environment)
+        return HalfGood(controller, environment, seed, wrong_goals.get("wrong_place"))
     raise BootifolError(
         f"there is no behavior '{behavior}'; choose among expert, half_good, random and still"
     )
 
 
-def script_of(task_name: str, environment: gymnasium.Env[Any, Any]) -> tuple[Controller, WrongGoal | None]:
-    """A task's scripted or bundled controller, and how to draw a wrong goal for it, if it can have another."""
+def script_of(
+    task_name: str, environment: gymnasium.Env[Any, Any]
+) -> tuple[Controller, dict[str, WrongGoal]]:
+    """A task's scripted or bundled controller, and how to draw wrong goals for it, by kind of failure, where it can
+    have another."""
     simulator = _simulator(environment)
     bundled = BUNDLED / f"{task_name}.safetensors"
     if bundled.exists():
         policy = StatePolicy.load(bundled)
-        return lambda goal: policy(simulator.state()), None
+        return lambda goal: policy(simulator.state()), {}
     if task_name == "reacher_hard":
         physics = simulator.physics
 
         def reach(goal: NDArray[np.float64] | None) -> Action:
             return reacher.torques(physics, reacher.target_position(physics) if goal is None else goal)
 
-        return reach, lambda rng: reacher.wrong_place(reacher.target_position(physics), rng)
+        return reach, {
+            "wrong_place": lambda rng: reacher.wrong_place(reacher.target_position(physics), rng),
+            "near_miss": lambda rng: reacher.near_miss(reacher.target_position(physics), rng),
+        }
     if task_name in ("drawn_reach", "drawn_home"):
 
         def move(goal: NDArray[np.float64] | None) -> Action:
             return drawn_reach.move(simulator.dot, simulator.target if goal is None else goal)
 
-        return move, lambda rng: drawn_reach.wrong_place(simulator.target, rng)
+        return move, {"wrong_place": lambda rng: drawn_reach.wrong_place(simulator.target, rng)}
     if task_name in meta_world.GOALS:
-        return meta_world.script(task_name, simulator), lambda rng: meta_world.wrong_place(
-            task_name, simulator, rng
-        )
+        return meta_world.script(task_name, simulator), {
+            "wrong_place": lambda rng: meta_world.wrong_place(task_name, simulator, rng),
+            "near_miss": lambda rng: meta_world.near_miss(task_name, simulator, rng),
+        }
     raise BootifolError(f"there is no expert for the task {task_name}; import videos of it instead")
 
 

@@ -18,6 +18,7 @@ from bootifol.experts.policy import StatePolicy
 from bootifol.types import Action, Observation
 
 KINDS = (
+    "near_miss",
     "wrong_place",
     "stopped_short",
     "late",
@@ -30,10 +31,11 @@ KINDS = (
 )
 """From the most plausible down.
 
-wrong_place: the expert's reach to another place, where the task has a place to go. stopped_short: the expert for a
-fifth of the episode, then nothing. late: nothing for three fifths, then the expert. weak: the expert's actions at a
-fifth of their strength. half_random: every other action is random. half_trained: an earlier policy of the expert's
-training, where one is bundled. held_actions: random actions, each held for ten steps. random, still: as recorded.
+near_miss: the expert's reach to a place beside the goal, too far from it to count. wrong_place: its reach to another
+place altogether. Both where the task has a place to go. stopped_short: the expert for a fifth of the episode, then
+nothing. late: nothing for three fifths, then the expert. weak: the expert's actions at a fifth of their strength.
+half_random: every other action is random. half_trained: an earlier policy of the expert's training, where one is
+bundled. held_actions: random actions, each held for ten steps. random, still: as recorded.
 """
 
 
@@ -43,9 +45,12 @@ def failures_of(task_name: str, environment: gymnasium.Env[Any, Any]) -> list[st
     Raises:
         BootifolError: the task has no expert to fail like.
     """
-    _, wrong_goal = script_of(task_name, environment)
+    _, wrong_goals = script_of(task_name, environment)
     half_trained = BUNDLED / f"{task_name}.half_trained.safetensors"
-    missing = {"wrong_place": wrong_goal is None, "half_trained": not half_trained.exists()}
+    missing = {
+        **{kind: kind not in wrong_goals for kind in ("near_miss", "wrong_place")},
+        "half_trained": not half_trained.exists(),
+    }
     return [kind for kind in KINDS if not missing.get(kind, False)]
 
 
@@ -58,13 +63,13 @@ def make_failure(kind: str, task_name: str, environment: gymnasium.Env[Any, Any]
         environment: what it acts in.
         seed: of everything random about it.
     """
-    controller, wrong_goal = script_of(task_name, environment)
+    controller, wrong_goals = script_of(task_name, environment)
     if kind == "half_trained":
         policy = StatePolicy.load(BUNDLED / f"{task_name}.half_trained.safetensors")
         simulator = environment.unwrapped.simulator  # type: ignore[attr-defined]
         controller = lambda goal: policy(simulator.state())  # noqa: E731
     rng = np.random.default_rng([seed, 5])
-    return _Failure(kind, controller, environment, rng, wrong_goal if kind == "wrong_place" else None)
+    return _Failure(kind, controller, environment, rng, wrong_goals.get(kind))
 
 
 class _Failure:

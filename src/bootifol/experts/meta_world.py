@@ -42,3 +42,10 @@ def wrong_place(task_name: str, simulator: Any, rng: np.random.Generator) -> NDA
     place: NDArray[np.float64] = simulator.observation[GOALS[task_name]].copy()
     place[0] += rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 0.3)
     return place
+
+
+def near_miss(task_name: str, simulator: Any, rng: np.random.Generator) -> NDArray[np.float64]:
+    """A goal `[3]`, 0.07 to 0.09 m to the left or the right of the true one, in meters."""
+    place: NDArray[np.float64] = simulator.observation[GOALS[task_name]].copy()
+    place[0] += rng.choice([-1.0, 1.0]) * rng.uniform(0.07, 0.09)
+    return place

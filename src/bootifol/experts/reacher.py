@@ -45,6 +45,17 @@ def wrong_place(target: NDArray[np.float64], rng: np.random.Generator) -> NDArra
     return place
 
 
+def near_miss(target: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """A goal `[2]` beside the target, 0.04 to 0.06 m from it and within reach; the reward ends at 0.025 m."""
+    while True:
+        angle = rng.uniform(-np.pi, np.pi)
+        place: NDArray[np.float64] = target + rng.uniform(0.04, 0.06) * np.array(
+            [np.cos(angle), np.sin(angle)]
+        )
+        if 0.03 < np.hypot(*place) < 2 * LINK - 0.01:
+            return place
+
+
 def _nearest_angles(goal: NDArray[np.float64], angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """The joint angles that reach `goal`: of the two elbow bends, the one closer to where the arm is."""
     distance = min(float(np.hypot(*goal)), 2 * LINK - 1e-4)
