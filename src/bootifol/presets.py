@@ -237,7 +237,7 @@ FRAMES = _seeing(
 )
 FRAMES = replace(
     FRAMES,
-    alignment=AlignmentConfig(gradient_steps=1000),
+    alignment=AlignmentConfig(gradient_steps=2000),
     interactive=InteractiveConfig(
         agent_steps=100_000, reward_update_every=8, reward_updates_until=48_000, agent_videos=1000
     ),
@@ -248,16 +248,14 @@ FRAMES = replace(
 
 DEMO = replace(
     FRAMES,
-    alignment=AlignmentConfig(gradient_steps=700, time_share=0.3),
+    alignment=AlignmentConfig(gradient_steps=1500, time_share=0.3),
     interactive=replace(FRAMES.interactive, agent_steps=60_000, agent_videos=500),
     evaluation=EvaluationConfig(every=10_000, long_episodes=1, final_episodes=10),
     checkpoint_minutes=5.0,
 )
 """For `make demo`: `frames` in minutes."""
 
-DRAWN = _seeing(
-    DRAWN_PIXELS, FrameConfig(late_from=0.0, temperature=0.1, moments=3, noise=0.05), replay_capacity=20_000
-)
+DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(late_from=0.0, noise=0.05), replay_capacity=20_000)
 DRAWN = replace(
     DRAWN,
     alignment=AlignmentConfig(gradient_steps=1000, time_share=0.5),

@@ -141,7 +141,7 @@ def test_videos_too_short_or_without_states_are_refused(trained: FrameRewardMode
         def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
             return super().sample(count, rng)[:, :4]
 
-    with pytest.raises(BootifolError, match="have 4 frames, but 8 are needed to tell 6 moments apart"):
+    with pytest.raises(BootifolError, match="have 4 frames, but 5 are needed to tell 3 moments apart"):
         next(trained.align(Short("short", True), OTHER))
     with pytest.raises(BootifolError, match="learns from the states of the agent's videos"):
         trained.update(EXPERT, OTHER)

@@ -29,13 +29,13 @@ class FrameConfig:
     agent_weight: float = 0.2
     """Weight of L_B, by which the agent's frames bootstrap the head in the Interactive Phase."""
 
-    temperature: float = 0.05
+    temperature: float = 0.1
     """tau of L_E and L_T."""
 
     videos_per_class: int = 16
     """Videos of either class in a gradient step of the Alignment Phase."""
 
-    moments: int = 6
+    moments: int = 3
     """Moments of each of them in it; of each, a frame and one next to it."""
 
     frames_per_class: int = 96
@@ -54,10 +54,10 @@ class FrameConfig:
     shift: int = 2
     """Largest random shift of the pictures, in pixels, while the eyes learn."""
 
-    noise: float = 0.3
+    noise: float = 0.1
     """Standard deviation of the noise on the states (of variance about 1) that the head learns from in the Interactive
     Phase. Less of it, and the head tells the agent's successes from the expert's by how they differ in detail, and
-    takes their reward away."""
+    takes their reward away; more, and it rewards near misses."""
 
     learning_rate: float = 1e-3
     """Of Adam in the Alignment Phase."""
