@@ -228,6 +228,7 @@ FRAMES = _seeing(
     hidden_dim=256,
     batch_size=256,
     learning_rate=3e-4,
+    learning_rate_decay=0.9,
     discount=0.95,
     replay_capacity=300_000,
     warm_up_steps=3000,
