@@ -240,7 +240,7 @@ FRAMES = replace(
     FRAMES,
     alignment=AlignmentConfig(gradient_steps=2000),
     interactive=InteractiveConfig(
-        agent_steps=100_000, reward_update_every=8, reward_updates_until=48_000, agent_videos=1000
+        agent_steps=100_000, reward_update_every=8, reward_updates_until=24_000, agent_videos=1000
     ),
     demonstrations=DemonstrationConfig(),
     evaluation=replace(CPU.evaluation, every=10_000),
