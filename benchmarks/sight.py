@@ -23,7 +23,7 @@ from rich.console import Console
 from benchmarks.command import command
 from bootifol.demos.demo_set import DemoSet, VideoSubset, find_demo_sets
 from bootifol.errors import BootifolError
-from bootifol.evaluation.sight import Performance, failures, perform, returns, sight
+from bootifol.evaluation.sight import Performance, against_kinds, failures, perform, returns, sight
 from bootifol.files import written_aside
 from bootifol.presets import preset
 from bootifol.progress import progress
@@ -92,7 +92,7 @@ def confused(performances: list[Performance], figures: Metrics) -> list[int]:
     names = np.array([performance.performer for performance in performances])
     failing = failures(performances)
     of_expert = np.flatnonzero(names == "expert")
-    against = {name.removeprefix("auc:"): value for name, value in figures.items() if name.startswith("auc:")}
+    against = against_kinds(figures)
     chosen = [int(of_expert[np.argsort(learned[of_expert])[len(of_expert) // 2]])]
     for kind in sorted(against, key=against.__getitem__)[:3]:
         failed = np.flatnonzero((names == kind) & failing)

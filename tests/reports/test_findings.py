@@ -257,3 +257,17 @@ def test_a_cloning_phase_that_was_cut_off_is_told(tmp_path: Path) -> None:
 def test_a_policy_worse_than_random_is_told_so(tmp_path: Path) -> None:
     first = findings(read_run(write_run(tmp_path / "run", returns=(-20.0, -10.0))))[0]
     assert first.verdict == "poor" and first.text.endswith("It is worse than random actions.")
+
+
+def test_sight_speaks_for_the_reward_where_somebody_could_fail(tmp_path: Path) -> None:
+    directory = write_run(tmp_path / "run", [50.0] * STARTS)
+    moments = ((0, 0.7, 0.9), (5000, 0.97, 0.99))
+    with (directory / "metrics.jsonl").open("a") as file:
+        for steps, late, still in moments:
+            record = {"phase": "interactive", "agent_steps": steps, "seconds": 1.0, "sight/spearman": 0.8}
+            file.write(json.dumps({**record, "sight/auc:late": late, "sight/auc:still": still}) + "\n")
+    run = read_run(directory)
+    assert run.sight_moments()[0] == {"spearman": 0.8, "auc:late": 0.7, "auc:still": 0.9}
+    (sight,) = [finding for finding in findings(run) if "plausible failures" in finding.text]
+    assert sight.verdict == "good"
+    assert "97%" in sight.text and "70%" in sight.text

@@ -180,3 +180,13 @@ def test_the_same_figure_gives_the_same_bytes(run: RunFiles) -> None:
 @pytest.mark.parametrize(("value", "text"), [(950, "950"), (12_000, "12K"), (1_550_000, "1.55M"), (0, "0")])
 def test_counts_are_short(value: float, text: str) -> None:
     assert thousands(value) == text
+
+
+def test_sight_shows_both_moments_of_each_kind() -> None:
+    moments = {
+        0: {"auc:late": 0.6, "spearman": 0.2},
+        900: {"auc:late": 0.9, "auc:still": 1.0, "spearman": 0.5},
+    }
+    (axes,) = plots.sight_plot(moments).axes
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["still", "late"]
+    assert sorted(float(dots.get_offsets()[0][0]) for dots in axes.collections) == [0.6, 0.9, 1.0]

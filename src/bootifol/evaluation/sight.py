@@ -108,9 +108,14 @@ def returns(performances: Sequence[Performance]) -> tuple[NDArray[np.float64], N
     return true, learned
 
 
+def against_kinds(figures: Metrics) -> Metrics:
+    """The AUCs by kind of failure."""
+    return {name.removeprefix("auc:"): value for name, value in figures.items() if name.startswith("auc:")}
+
+
 def in_words(figures: Metrics) -> str:
     """One sentence: the failure that the reward tells worst from the expert, and the rank correlation."""
-    against = {name.removeprefix("auc:"): value for name, value in figures.items() if name.startswith("auc:")}
+    against = against_kinds(figures)
     if not against:
         return f"nobody failed at this task; Spearman with the true return {figures['spearman']:.2f}"
     worst = min(against, key=against.__getitem__)

@@ -10,6 +10,7 @@ import numpy as np
 
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import RankingScores, expert_above_random, ranking_scores
+from bootifol.evaluation.sight import against_kinds, in_words
 from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import EvaluationRow, RankingRow
 from bootifol.reports.final_return import FinalReturn, final_return
@@ -143,6 +144,26 @@ def _policy_without_scale(run: RunFiles, final: FinalReturn) -> Finding:
 
 
 def _reward(run: RunFiles) -> Finding | None:
+    return _sight(run) or _order_of_videos(run)
+
+
+def _sight(run: RunFiles) -> Finding | None:
+    """Whether the reward tells the expert from plausible failures; None where nobody could play them."""
+    moments = run.sight_moments()
+    last = next(reversed(moments.values()), {})
+    against = against_kinds(last)
+    if not against:
+        return None
+    text = in_words(last)
+    if len(moments) > 1:
+        first = against_kinds(next(iter(moments.values())))
+        worst = min(first, key=first.__getitem__, default=None)
+        if worst is not None:
+            text += f"; before the agent acted it was {_percent(first[worst])} at worst ({worst.replace('_', ' ')})"
+    return Finding(_verdict(min(against.values()), good=0.95, fair=0.8), f"{text[0].upper()}{text[1:]}.")
+
+
+def _order_of_videos(run: RunFiles) -> Finding | None:
     scored = [(steps, scores_or_none(rows)) for steps, rows in run.ranking_moments().items()]
     known = [(steps, scores) for steps, scores in scored if scores is not None]
     if not known:

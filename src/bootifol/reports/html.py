@@ -13,6 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from bootifol.evaluation.sight import against_kinds
 from bootifol.evaluation.summary import Summary
 from bootifol.files import written_aside
 from bootifol.progress import duration
@@ -79,6 +80,7 @@ class RunSection:
 
     strips: Sequence[Card]
     curves: Sequence[Card]
+    sight: Sequence[Card]
     ranking: Sequence[Card]
     losses: Sequence[Card]
     other_metrics: Sequence[Card]
@@ -236,6 +238,7 @@ def _section(look: RunLook, anchor: str, alone: bool) -> RunSection:
         videos=_video_rows(run),
         strips=_strip_cards(run),
         curves=_curve_cards(single),
+        sight=_sight_cards(run),
         ranking=_ranking_cards(run),
         losses=_loss_cards(single) if alone else [],
         other_metrics=_other_cards(single),
@@ -317,6 +320,18 @@ def _loss_cards(looks: Sequence[RunLook]) -> list[Card]:
     ]
 
 
+def _sight_cards(run: RunFiles) -> list[Card]:
+    moments = run.sight_moments()
+    if not any(against_kinds(figures) for figures in moments.values()):
+        return []
+    return _card(
+        "The expert against those who fail plausibly",
+        plots.sight_plot(moments),
+        "Hollow: before the agent acted. Full: at the end. At the line a coin would do as well; healthy: 0.95 or "
+        "more. A kind stands here if it failed in a quarter of its episodes at least.",
+    )
+
+
 def _ranking_cards(run: RunFiles) -> list[Card]:
     moments = run.ranking_moments()
     chosen = list(dict.fromkeys([*list(moments)[:1], *list(moments)[-1:]]))
@@ -349,7 +364,7 @@ def _other_cards(looks: Sequence[RunLook]) -> list[Card]:
     shown = {"episode/learned_reward", *LOSSES}
     cards = []
     for phase, name in sorted(looks[0].run.curves):
-        if name not in shown:
+        if name not in shown and not name.startswith("sight/"):
             unit = COUNTERS[phase].replace("_", " ") + ("" if COUNTERS[phase].endswith("s") else "s")
             caption = f"{phase.title()} Phase, over {unit}; band: the middle 80% of nearby values."
             cards += _card(name, plots.metric_curves(looks, phase, name), caption)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from bootifol.evaluation.sight import against_kinds
 from bootifol.evaluation.summary import summarize
 from bootifol.evaluation.tables import EvaluationRow, RankingRow
 from bootifol.reports.run_files import ALIGNMENT, INTERACTIVE, Curve, RunFiles
@@ -187,6 +188,28 @@ def ranking_plot(rows: Sequence[RankingRow]) -> Figure:
         axes.grid(axis="x", visible=True)
         axes.spines["left"].set_visible(False)
         axes.set_xlabel("learned reward, summed over the video")
+        return figure
+
+
+def sight_plot(moments: Mapping[int, Mapping[str, float]]) -> Figure:
+    """The chance that the expert is rewarded above each kind of failure: hollow after alignment, full at the end."""
+    first, last = (against_kinds(dict(list(moments.values())[at])) for at in (0, -1))
+    kinds = list({**last, **first})
+    with house_style():
+        figure = Figure(figsize=(HALF_WIDTH[0], 0.75 + 0.26 * len(kinds)), layout="constrained")
+        axes = figure.add_subplot()
+        for height, kind in enumerate(reversed(kinds)):
+            for against, filled in ((first, False), (last, True)):
+                if kind in against:
+                    color = KIND_COLORS["expert"]
+                    axes.scatter(
+                        against[kind], height, s=34, facecolor=color if filled else "none", edgecolor=color
+                    )
+        axes.axvline(0.5, color=FAINT, linewidth=1)
+        axes.set_xlim(-0.03, 1.03)
+        axes.set_yticks(range(len(kinds)), [kind.replace("_", " ") for kind in reversed(kinds)])
+        axes.set_ylim(-0.6, len(kinds) - 0.4)
+        axes.set_xlabel("share of pairs in which the expert is rewarded above it")
         return figure
 
 

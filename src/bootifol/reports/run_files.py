@@ -152,6 +152,15 @@ class RunFiles:
         random = low.environment_return - slope * _scaled(low)
         return random, random + slope
 
+    def sight_moments(self) -> dict[int, dict[str, float]]:
+        """What `evaluation/sight.py` said, by agent steps in rising order; 0 is right after alignment."""
+        moments: dict[int, dict[str, float]] = {}
+        for (phase, name), curve in self.curves.items():
+            if phase == INTERACTIVE and name.startswith("sight/"):
+                for steps, value in zip(curve.steps, curve.values, strict=True):
+                    moments.setdefault(int(steps), {})[name.removeprefix("sight/")] = float(value)
+        return dict(sorted(moments.items()))
+
     def ranking_moments(self) -> dict[int, list[RankingRow]]:
         """Ranked videos by agent steps in rising order; 0 is right after alignment."""
         grouped: dict[int, list[RankingRow]] = {}
