@@ -228,7 +228,6 @@ FRAMES = _seeing(
     hidden_dim=256,
     batch_size=256,
     learning_rate=3e-4,
-    learning_rate_decay=0.9,
     discount=0.95,
     replay_capacity=300_000,
     warm_up_steps=3000,
@@ -240,7 +239,7 @@ FRAMES = replace(
     FRAMES,
     alignment=AlignmentConfig(gradient_steps=2000),
     interactive=InteractiveConfig(
-        agent_steps=100_000, reward_update_every=8, reward_updates_until=24_000, agent_videos=1000
+        agent_steps=100_000, reward_update_every=8, reward_updates_until=48_000, agent_videos=1000
     ),
     demonstrations=DemonstrationConfig(),
     evaluation=replace(CPU.evaluation, every=10_000),

@@ -335,18 +335,6 @@ def test_target_critic_follows_slowly() -> None:
         np.testing.assert_allclose(after[name], expected, rtol=1e-5, atol=1e-7)
 
 
-def test_the_learning_rate_decays_with_the_run() -> None:
-    """The first steps of Adam are as long as the learning rate."""
-    steps = {}
-    for passed in (0.0, 0.5, 1.0):
-        agent = make_agent(dataclasses.replace(SMALL, learning_rate_decay=0.8))
-        before = agent.state()["actor.policy.output.bias"]
-        agent.update(make_batch(), 0, passed)
-        steps[passed] = np.abs(agent.state()["actor.policy.output.bias"] - before).max()
-    assert steps[0.5] == pytest.approx(0.6 * steps[0.0], rel=1e-2)
-    assert steps[1.0] == pytest.approx(0.2 * steps[0.0], rel=1e-2)
-
-
 def test_the_averaged_policy_follows_slowly_and_acts_without_exploration() -> None:
     agent = make_agent(dataclasses.replace(SMALL, ema_decay=0.75))
     newest = make_agent(SMALL)

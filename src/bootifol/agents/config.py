@@ -59,10 +59,6 @@ class DrQv2Config:
     learning_rate: float = 1e-4
     """Of Adam, for encoder, critic and actor."""
 
-    learning_rate_decay: float = 0.0
-    """Beyond DrQ-v2: the part of learning_rate that is gone by the run's last agent step; it falls linearly. 0, as in
-    its paper, keeps it."""
-
     tau: float = 0.01
     """How far the target critic moves to the critic at each update (tau)."""
 
@@ -122,7 +118,7 @@ class DrQv2Config:
         )
         require_at_least(0, **of_self(*exploration, "saturation_weight", "cloning_weight", "random_shift"))
         require_positive(**of_self("learning_rate"))
-        require_share(**of_self("discount", "tau", "learning_rate_decay"))
+        require_share(**of_self("discount", "tau"))
         require_below_one(**of_self("ema_decay"))
 
     def exploration(self, agent_steps: float) -> float:

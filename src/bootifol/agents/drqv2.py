@@ -205,24 +205,16 @@ class DrQv2:
         self._average()
         return {"agent/cloning_loss": loss.detach()}
 
-    def update(self, batch: Batch, agent_steps: float, passed: float = 0.0) -> StepMetrics:
+    def update(self, batch: Batch, agent_steps: float) -> StepMetrics:
         """One update of critic and encoder, of the actor, and of the target critic, in this order.
 
         Nothing in it waits for a GPU, and metrics stay there until they are logged.
-
-        Args:
-            batch: of transitions.
-            agent_steps: where the noise schedule stands.
-            passed: the part of the run that has passed, in [0, 1], by which the learning rate decays.
 
         Raises:
             BootifolError: a loss is NaN or infinite (see `take_step`); the parameters are as before the step that
                 failed.
         """
         stddev = self.config.exploration(agent_steps)
-        for optimizer in (self._critic_optimizer, self._actor_optimizer):
-            left = 1 - self.config.learning_rate_decay * passed
-            optimizer.param_groups[0]["lr"] = self.config.learning_rate * left
         observation = self._network_input(batch.observation, self._precision)
         next_observation = self._network_input(batch.next_observation, self._precision)
         action, reward, discount = (

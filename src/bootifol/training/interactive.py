@@ -203,8 +203,7 @@ class InteractivePhase:
         if self.demonstrations is not None and not self.counters.cloning_phases:
             return  # the warm-up has ended in this episode, and cloning comes first
         batch = self._batch(self.agent.config.batch_size)
-        steps = self.budget.scheduled_steps(self.counters)
-        self.averages.add(self.agent.update(batch, steps, min(steps / self.config.agent_steps, 1.0)))
+        self.averages.add(self.agent.update(batch, self.budget.scheduled_steps(self.counters)))
         self.counters.agent_updates += 1
 
     def _batch(self, batch_size: int) -> Batch:
