@@ -54,7 +54,7 @@ class FrameConfig:
     shift: int = 2
     """Largest random shift of the pictures, in pixels, while the eyes learn."""
 
-    noise: float = 0.1
+    noise: float = 0.2
     """Standard deviation of the noise on the states (of variance about 1) that the head learns from in the Interactive
     Phase. Less of it, and the head tells the agent's successes from the expert's by how they differ in detail, and
     takes their reward away; more, and it rewards near misses."""
