@@ -148,11 +148,12 @@ def _reward(run: RunFiles) -> Finding | None:
 
 
 def _sight(run: RunFiles) -> Finding | None:
-    """Whether the reward tells the expert from plausible failures; None where nobody could play them."""
+    """Whether the reward tells the expert from plausible failures; None where nobody could play them, or where the
+    record of it is damaged."""
     moments = run.sight_moments()
     last = next(reversed(moments.values()), {})
     against = against_kinds(last)
-    if not against:
+    if not against or "spearman" not in last:
         return None
     text = in_words(last)
     if len(moments) > 1:
