@@ -13,11 +13,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # whoever lists tasks or records videos does not wait for PyTorch
+    import torch
 
 AnyPath = str | os.PathLike[str]
 """A path however it is written."""
@@ -52,7 +54,7 @@ Rewards = NDArray[np.float32]
 Metrics = Mapping[str, float]
 """Named numbers to log, such as `{"loss/sequence": 0.41}`."""
 
-StepMetrics = Mapping[str, float | torch.Tensor]
+StepMetrics: TypeAlias = "Mapping[str, float | torch.Tensor]"
 """Metrics of one step, of which some may still be scalars on their device, to be fetched when they are logged."""
 
 Arrays = dict[str, NDArray[np.generic]]

@@ -36,7 +36,7 @@ _DRAWN: dict[RenderProfile, str] = {
 
 
 def doctor() -> int:
-    """Say whether this machine can train: versions, cores, memory, speed of bf16, of learning by threads, of rendering.
+    """Say whether this machine can train: versions, cores, memory, the speed of learning and of rendering.
 
     Exits with 0 when it can, and with 2 and what to install when something is missing.
     """

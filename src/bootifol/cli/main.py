@@ -6,6 +6,7 @@ import functools
 import sys
 import warnings
 from collections.abc import Callable, Sequence
+from importlib import import_module, metadata
 from typing import Any
 
 import tyro
@@ -26,11 +27,49 @@ A first tour, about three minutes without a simulator:
   bootifol evaluate runs/first
   bootifol report runs/first
 
-`bootifol doctor` says what this machine can do, `bootifol tasks` what there is to learn.
+`bootifol doctor` says what this machine can do, `bootifol tasks` what there is to learn, `bootifol --version` which
+version this is.
 """
 
 DEMOS_DESCRIPTION = "Make, import, check, match and export sets of videos to learn from."
 EXPERTS_DESCRIPTION = "Train who performs a task in recordings, where none is bundled."
+
+COMMANDS = {
+    "doctor": (
+        "bootifol.cli.doctor",
+        "Say whether this machine can train: versions, cores, memory, the speed of learning and of rendering.",
+    ),
+    "tasks": (
+        "bootifol.cli.tasks",
+        "List the tasks, the lengths of their episodes, and the returns of their expert and of random actions.",
+    ),
+    "demos": (
+        "",
+        "Make, import, check, match and export sets of videos: demos record, import, check, match, export.",
+    ),
+    "train": (
+        "bootifol.cli.train",
+        "Learn a reward from videos and train a policy on it, or go on with an interrupted run.",
+    ),
+    "evaluate": (
+        "bootifol.cli.evaluate",
+        "Play episodes with the newest policy of one run or several, without exploration, and print their returns.",
+    ),
+    "score": (
+        "bootifol.cli.score",
+        "Reward videos with a run's learned reward: one number each, every step's in a CSV file or above film strips.",
+    ),
+    "report": (
+        "bootifol.cli.report",
+        "Write what one run learned, or several side by side, as one HTML file that opens in any browser.",
+    ),
+    "table": (
+        "bootifol.cli.table",
+        "Print the paper's result tables, scaled and absolute, with the returns of your runs beside the paper's.",
+    ),
+    "experts": ("", "Train an expert for recordings: experts train."),
+}
+"""Of each command the module whose function it is, and what it does: the first line of that function's docstring."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -50,12 +89,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _exit_code(words: list[str]) -> int:
+    if words == ["--version"]:
+        print(f"bootifol {metadata.version('bootifol')}")
+        return 0
     try:
         if words[:1] == ["demos"]:
             return _run(_demos_commands(), words[1:], "bootifol demos", DEMOS_DESCRIPTION)
         if words[:1] == ["experts"]:
             return _run(_experts_commands(), words[1:], "bootifol experts", EXPERTS_DESCRIPTION)
-        return _run(_commands(words), words, "bootifol", DESCRIPTION)
+        return _run(_command_of(words), words, "bootifol", DESCRIPTION)
     except BootifolError as error:
         return _refused(str(error))
     except (MemoryError, RuntimeError) as error:
@@ -98,26 +140,30 @@ def _run(commands: dict[str, Callable[..., int]], words: list[str], prog: str, d
     return code
 
 
-def _commands(words: list[str]) -> dict[str, Callable[..., int]]:
-    from bootifol.cli.doctor import doctor
-    from bootifol.cli.evaluate import evaluate
-    from bootifol.cli.report import report
-    from bootifol.cli.score import score
-    from bootifol.cli.table import table
-    from bootifol.cli.tasks import tasks
-    from bootifol.cli.train import preset_of, train
+def _command_of(words: list[str]) -> dict[str, Callable[..., int]]:
+    """All commands by name: the one that was typed as it is, of the others what they do, since importing each would
+    keep the help waiting for PyTorch."""
+    commands = {name: _placeholder(summary) for name, (_, summary) in COMMANDS.items()}
+    if words and words[0] in COMMANDS:
+        commands[words[0]] = _imported(words[0], words)
+    return commands
 
-    return {
-        "doctor": doctor,
-        "tasks": tasks,
-        "demos": _demos_placeholder,
-        "train": functools.partial(train, config=preset_of(words), words=tuple(words)),
-        "evaluate": evaluate,
-        "score": score,
-        "report": report,
-        "table": table,
-        "experts": _experts_placeholder,
-    }
+
+def _imported(name: str, words: list[str]) -> Callable[..., int]:
+    command: Callable[..., int] = getattr(import_module(COMMANDS[name][0]), name)
+    if name == "train":
+        from bootifol.cli.train import preset_of
+
+        return functools.partial(command, config=preset_of(words), words=tuple(words))
+    return command
+
+
+def _placeholder(summary: str) -> Callable[..., int]:
+    def command() -> int:
+        raise NotImplementedError
+
+    command.__doc__ = summary
+    return command
 
 
 def _demos_commands() -> dict[str, Callable[..., int]]:
@@ -130,13 +176,3 @@ def _experts_commands() -> dict[str, Callable[..., int]]:
     from bootifol.cli.experts import train
 
     return {"train": train}
-
-
-def _experts_placeholder() -> int:
-    """Train an expert for recordings: experts train."""
-    return main(["experts", "--help"])
-
-
-def _demos_placeholder() -> int:
-    """Make, import, check, match and export sets of videos: demos record, import, check, match, export."""
-    return main(["demos", "--help"])
