@@ -18,7 +18,7 @@ setup: .venv/complete
 .venv/ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(INSTALL) --editable .
+	$(INSTALL) --editable '.[dm-control,tensorboard]'
 	bash scripts/opengl.sh $(BIN)/python
 	touch .venv/ready
 

@@ -9,16 +9,20 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 from torch import Tensor
-from torch.utils.tensorboard import SummaryWriter
 
 from bootifol.devices import to_floats
 from bootifol.errors import BootifolError
 from bootifol.files import parsed_json
 from bootifol.types import Metrics, StepMetrics
+
+if TYPE_CHECKING:
+    from torch.utils.tensorboard import SummaryWriter
 
 _PIECE = 1 << 16
 
@@ -60,7 +64,7 @@ class Tracker:
 
     Args:
         directory: the run's directory.
-        tensorboard: whether to write event files under `directory/tensorboard`.
+        tensorboard: whether to write event files under `directory/tensorboard`, where TensorBoard is installed.
 
     Raises:
         BootifolError: the files cannot be written; so do all methods.
@@ -75,7 +79,7 @@ class Tracker:
             if self.path.exists() and not self.path.is_file():
                 raise OSError(f"{self.path} is no file")
             self._file = self.path.open("ab", buffering=0)
-            if tensorboard:
+            if tensorboard and find_spec("tensorboard") is not None:
                 self._begin_events()
 
     def log(self, phase: str, count_name: str, count: int, seconds: float, metrics: Metrics) -> None:
@@ -124,6 +128,8 @@ class Tracker:
             raise
 
     def _begin_events(self) -> None:
+        from torch.utils.tensorboard import SummaryWriter
+
         earlier = sorted(self._events.glob("events.out.tfevents.*"))
         for file in earlier:
             file.unlink()

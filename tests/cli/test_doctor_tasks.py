@@ -1,3 +1,4 @@
+import importlib
 import os
 import re
 import subprocess
@@ -14,6 +15,7 @@ from bootifol.cli import doctor as doctor_command
 from bootifol.cli.main import main
 from bootifol.envs import camera
 from bootifol.envs.drawn import DrawnReach
+from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.tasks import TASKS
 
@@ -112,16 +114,54 @@ def test_doctor_names_missing_packages_and_how_to_install_them(
 ) -> None:
     version = metadata.version
 
-    def without_dm_control(name: str) -> str:
-        if name == "dm-control":
+    def without_av(name: str) -> str:
+        if name == "av":
             raise metadata.PackageNotFoundError(name)
         return version(name)
 
-    monkeypatch.setattr(doctor_command.metadata, "version", without_dm_control)
+    monkeypatch.setattr(doctor_command.metadata, "version", without_av)
     assert main(["doctor"]) == 2
     captured = capsys.readouterr()
-    assert "pip install 'dm-control>=1.0.28'" in captured.err
-    assert any("dm-control" in line and "missing" in line for line in captured.out.splitlines())
+    assert "pip install 'av>=17'" in captured.err
+    assert any("av " in line and "missing" in line for line in captured.out.splitlines())
+
+
+def test_doctor_is_content_without_a_simulator_and_says_how_to_get_one(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    version = doctor_command._version
+    simulators = ("dm-control", "metaworld", "mujoco")
+    monkeypatch.setattr(
+        doctor_command, "_version", lambda name: None if name in simulators else version(name)
+    )
+    monkeypatch.setattr(doctor_command, "milliseconds_by_threads", lambda counts: {1: (50.0, 300.0)})
+    assert main(["doctor"]) == 0
+    printed = capsys.readouterr().out
+    assert "Pictures of drawn_reach" in printed
+    for name in ("dm-control", "metaworld"):
+        assert f"{name} is not installed; its tasks need `pip install 'bootifol[{name}]'`" in printed
+
+
+def test_a_simulator_that_is_not_installed_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dm_control", None)
+    monkeypatch.delitem(sys.modules, "dm_control.suite", raising=False)
+    with pytest.raises(
+        BootifolError, match=r"needs dm_control, which is not installed.*bootifol\[dm-control\]"
+    ):
+        catalogue.make_environment("reacher_hard", PictureConfig(), 5)
+
+
+def test_a_simulator_written_for_another_mujoco_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    suite = importlib.import_module("dm_control.suite")
+
+    def without_a_field(*_: object, **__: object) -> None:
+        raise AttributeError("'MjModel' object has no attribute 'flex_vertedge'")
+
+    monkeypatch.setattr(suite, "load", without_a_field)
+    with pytest.raises(
+        BootifolError, match=r"dm_control .* and mujoco .* do not go together .*flex_vertedge"
+    ):
+        catalogue.make_environment("reacher_hard", PictureConfig(), 5)
 
 
 def test_doctor_does_not_ask_for_what_only_developers_need() -> None:

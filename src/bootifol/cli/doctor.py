@@ -21,7 +21,11 @@ from bootifol.errors import BootifolError
 from bootifol.experts import make_random
 from bootifol.tasks import make_environment
 
-_TASK = "reacher_hard"
+_SIMULATORS = {"dm-control": "reacher_hard", "metaworld": "button_press"}
+"""Simulators by the package that brings them, which is also the name of the extra, and a task to try each with."""
+_OF_SIMULATORS = (*_SIMULATORS, "mujoco")
+_DRAWN_TASK = "drawn_reach"
+"""Needs no simulator."""
 _PICTURE_SIZE = 64
 _STEPS = 12
 _FRAMES = 61
@@ -74,38 +78,55 @@ def doctor() -> int:
         f"one run on this machine: --threads {advised_threads(by_threads)}; several at once: --threads 1\n"
     )
 
-    table = Table(
-        "render profile",
-        "ms an agent step",
-        "what it draws",
-        title=f"Pictures of {_TASK}, {_PICTURE_SIZE}×{_PICTURE_SIZE}",
-        title_justify="left",
-    )
-    for profile in get_args(RenderProfile):
-        table.add_row(profile, f"{milliseconds_per_step(profile):.1f}", _DRAWN[profile])
-    console.print(table)
+    there = [name for name in _SIMULATORS if _version(name)]
+    for name in there:
+        _show_pictures(console, _SIMULATORS[name])
+    for name in sorted(set(_SIMULATORS) - set(there)):
+        console.print(f"{name} is not installed; its tasks need `pip install 'bootifol\\[{name}]'`")
+    if not there:
+        _show_pictures(console, _DRAWN_TASK)
     console.print("this machine can record videos and train")
     return 0
 
 
+def _show_pictures(console: Console, task: str) -> None:
+    """Raises:
+    BootifolError: pictures of the task cannot be rendered here.
+    """
+    profiles = {_DRAWN_TASK: ("fast",)}.get(task, get_args(RenderProfile))
+    table = Table(
+        "render profile",
+        "ms an agent step",
+        "what it draws",
+        title=f"Pictures of {task}, {_PICTURE_SIZE}×{_PICTURE_SIZE}",
+        title_justify="left",
+    )
+    for profile in profiles:
+        table.add_row(profile, f"{milliseconds_per_step(task, profile):.1f}", _DRAWN[profile])
+    console.print(table)
+
+
 def installed() -> tuple[dict[str, tuple[str | None, str]], list[str]]:
-    """The packages that bootifol needs.
+    """The packages that bootifol needs, and the simulators that are there.
 
     Returns:
         By name, the version (None where missing) and what is needed, such as ">=3.3"; and the missing names.
     """
     versions: dict[str, tuple[str | None, str]] = {"bootifol": (metadata.version("bootifol"), "")}
     for requirement in metadata.requires("bootifol") or []:
-        if "extra ==" in requirement:
-            continue
         match = re.match(r"([\w.-]+)\s*([^;]*)", requirement)
         assert match is not None, requirement
         name, needed = match[1], match[2].strip()
-        try:
-            versions[name] = (metadata.version(name), needed)
-        except metadata.PackageNotFoundError:
-            versions[name] = (None, needed)
+        if "extra ==" not in requirement or (name in _OF_SIMULATORS and _version(name)):
+            versions[name] = (_version(name), needed)
     return versions, [name for name, (version, _) in versions.items() if version is None]
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def machine() -> list[tuple[str, str]]:
@@ -193,14 +214,14 @@ def milliseconds_by_threads(counts: list[int]) -> dict[int, tuple[float, float]]
     return {threads: (min(update), min(step)) for threads, (update, step) in times.items()}
 
 
-def milliseconds_per_step(profile: RenderProfile) -> float:
+def milliseconds_per_step(task: str, profile: RenderProfile) -> float:
     """Median time of an agent step with its picture.
 
     Raises:
         BootifolError: pictures cannot be rendered here.
     """
     pictures = PictureConfig(agent_size=_PICTURE_SIZE, video_size=_PICTURE_SIZE, profile=profile)
-    environment = make_environment(_TASK, pictures, _STEPS)
+    environment = make_environment(task, pictures, _STEPS)
     act = make_random(environment, seed=0)
     observation, _ = environment.reset(seed=0)
     times = []

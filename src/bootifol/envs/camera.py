@@ -12,6 +12,7 @@ import os
 import sys
 import weakref
 from dataclasses import dataclass
+from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from PIL import Image
 
 from bootifol.envs.pictures import RenderProfile
 from bootifol.errors import BootifolError
+from bootifol.own_modules import told
 from bootifol.types import Frame
 
 
@@ -152,10 +154,44 @@ def load_mujoco() -> Any:
         BootifolError: MuJoCo or the OpenGL platform it was told to use cannot be imported.
     """
     prepare_opengl()
+    return load_simulator("mujoco", "dm-control")
+
+
+def load_simulator(module: str, extra: str) -> Any:
+    """A simulator's module.
+
+    Args:
+        module: its name.
+        extra: of bootifol, which installs it.
+
+    Raises:
+        BootifolError: it is not installed, does not go with the installed MuJoCo, or MuJoCo cannot load its OpenGL
+            platform.
+    """
+    package = module.partition(".")[0]
     try:
-        return importlib.import_module("mujoco")
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        missing = (error.name or package).partition(".")[0]
+        whose = "this task" if missing == package else package
+        raise BootifolError(
+            f"{whose} needs {missing}, which is not installed; type `pip install 'bootifol[{extra}]'`"
+        ) from error
+    except AttributeError as error:  # as of a field of MuJoCo's that another version has
+        if package == "mujoco" or "GL" in str(error):  # PyOpenGL's, where there is no platform
+            raise no_rendering(error) from error
+        raise unlike_mujoco(package, extra, error) from error
     except Exception as error:  # each OpenGL platform fails with exceptions of its own
         raise no_rendering(error) from error
+
+
+def unlike_mujoco(package: str, extra: str, error: BaseException) -> BootifolError:
+    """The sentence for a simulator that was written for another version of MuJoCo."""
+    versions = " and ".join(f"{name} {metadata.version(name)}" for name in (package, "mujoco"))
+    return BootifolError(
+        f"{versions} do not go together ({told(error)}); type `pip install --upgrade 'bootifol[{extra}]'` for versions "
+        "that do"
+    )
 
 
 def _context_class(mujoco: Any) -> Any:

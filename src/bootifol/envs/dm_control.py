@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bootifol.envs.camera import Camera, load_mujoco, no_rendering
+from bootifol.envs.camera import Camera, load_mujoco, load_simulator, unlike_mujoco
 from bootifol.envs.pictures import PictureConfig
 from bootifol.types import Action, Frame
 
@@ -25,17 +24,19 @@ class DMControlSimulator:
         pictures: size and render profile.
 
     Raises:
-        BootifolError: OpenGL is missing, so nothing can be rendered.
+        BootifolError: dm-control is not installed or does not go with MuJoCo, or OpenGL is missing, so nothing can be
+            rendered.
     """
 
     def __init__(self, domain: str, task: str, pictures: PictureConfig) -> None:
         load_mujoco()
-        try:
-            suite = importlib.import_module("dm_control.suite")
-        except Exception as error:  # it loads an OpenGL platform too, which fails in ways of its own
-            raise no_rendering(error) from error
+        suite = load_simulator("dm_control.suite", "dm-control")
         # Our time limit is the only one: past its own, the suite would start the next episode unasked.
-        self.environment: Any = suite.load(domain, task, task_kwargs={"random": 0, "time_limit": np.inf})
+        settings = {"random": 0, "time_limit": np.inf}
+        try:
+            self.environment: Any = suite.load(domain, task, task_kwargs=settings)
+        except (AttributeError, TypeError) as error:
+            raise unlike_mujoco("dm_control", "dm-control", error) from error
         specification = self.environment.action_spec()
         self.action_dim = int(np.prod(specification.shape))
         self.step_seconds = float(self.environment.control_timestep())

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bootifol.envs.camera import Camera, load_mujoco, no_rendering
+from bootifol.envs.camera import Camera, load_mujoco, load_simulator
 from bootifol.envs.pictures import PictureConfig
-from bootifol.errors import BootifolError
 from bootifol.types import Action, Frame
 
 CAMERA = "corner4"
@@ -79,13 +77,4 @@ def load_meta_world(module: str) -> Any:
     Raises:
         BootifolError: Meta-World is not installed, or MuJoCo cannot load its OpenGL platform.
     """
-    try:
-        return importlib.import_module(f"metaworld.{module}")
-    except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] != "metaworld":
-            raise
-        raise BootifolError(
-            "this task needs Meta-World 3, which is not installed; type `pip install metaworld==3.1.1`"
-        ) from error
-    except Exception as error:  # each OpenGL platform fails with exceptions of its own
-        raise no_rendering(error) from error
+    return load_simulator(f"metaworld.{module}", "metaworld")
