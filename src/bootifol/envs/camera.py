@@ -11,6 +11,7 @@ import importlib
 import os
 import sys
 import weakref
+from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
@@ -19,6 +20,7 @@ import numpy as np
 import torch
 from PIL import Image
 
+from bootifol.envs.meshes import coarse_meshes
 from bootifol.envs.pictures import RenderProfile
 from bootifol.errors import BootifolError
 from bootifol.own_modules import told
@@ -38,19 +40,39 @@ class RenderQuality:
     """Whether what lies behind the scene is drawn or black; reacher's floor hides all of it."""
     round_sides: int | None
     """Sides of a circle; spheres and capsules are drawn as polyhedra, and their corners cost time, too."""
+    mesh_cell: float
+    """Vertices of meshes within a cell of so many meters are drawn as one (`coarse_meshes`); 0 draws all."""
     oversampling: int
     """The picture is rendered this many times as high and wide, then averaged: cheap anti-aliasing."""
 
 
 QUALITIES: dict[RenderProfile, RenderQuality] = {
     "fast": RenderQuality(
-        round_sides=16, shadow_map=0, samples=0, reflections=False, sky=False, oversampling=2
+        round_sides=16,
+        shadow_map=0,
+        samples=0,
+        reflections=False,
+        sky=False,
+        mesh_cell=0.005,
+        oversampling=2,
     ),
     "balanced": RenderQuality(
-        round_sides=None, shadow_map=512, samples=0, reflections=True, sky=True, oversampling=1
+        round_sides=None,
+        shadow_map=512,
+        samples=0,
+        reflections=True,
+        sky=True,
+        mesh_cell=0.0,
+        oversampling=1,
     ),
     "full": RenderQuality(
-        round_sides=None, shadow_map=None, samples=None, reflections=True, sky=True, oversampling=1
+        round_sides=None,
+        shadow_map=None,
+        samples=None,
+        reflections=True,
+        sky=True,
+        mesh_cell=0.0,
+        oversampling=1,
     ),
 }
 
@@ -99,7 +121,8 @@ class Camera:
         try:
             self._opengl = _context_class(mujoco)(rendered, rendered)
             self._opengl.make_current()
-            self._objects = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+            with coarse_meshes(model, quality.mesh_cell) if quality.mesh_cell else nullcontext():
+                self._objects = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._objects)
         except Exception as error:  # each OpenGL platform fails with exceptions of its own
             raise no_rendering(error) from error
