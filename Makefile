@@ -10,7 +10,7 @@ TORCH_INDEX ?=
 INSTALL := $(BIN)/python -m pip install --quiet --constraint constraints.txt \
   $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX))
 
-.PHONY: demo test check format bench setup clean
+.PHONY: demo test test-matrix check docs format bench setup clean
 
 setup: .venv/complete
 
@@ -38,8 +38,8 @@ demo: .venv/ready
 	fi
 	@echo "open $(DEMO)/run/report.html in a browser"
 
-# Lint, types, all tests; a file to a worker, the slow ones first (tests/conftest.py).
-test: check
+# Lint, types, the site's links, all tests; a file to a worker, the slow ones first (tests/conftest.py).
+test: check docs
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
 
 check: .venv/complete
@@ -47,9 +47,17 @@ check: .venv/complete
 	$(BIN)/ruff format --check $(SOURCES)
 	$(BIN)/mypy
 
+# The site, in site/.
+docs: .venv/complete
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir site
+
 format: .venv/complete
 	$(BIN)/ruff check --fix $(SOURCES)
 	$(BIN)/ruff format $(SOURCES)
+
+# Every Python at hand, newest and lowest versions, in empty environments (gigabytes: see the script).
+test-matrix: .venv/complete
+	$(BIN)/python scripts/test_matrix.py
 
 bench: .venv/complete
 	$(BIN)/python -m benchmarks.engine
