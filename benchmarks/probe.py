@@ -25,8 +25,10 @@ from torch import nn
 
 from benchmarks.command import command
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.manifest import read_manifest
 from bootifol.envs.dm_control import DMControlSimulator
 from bootifol.envs.meta_world import MetaWorldSimulator
+from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.rollout import rollout
 from bootifol.errors import BootifolError
 from bootifol.experts import make_expert
@@ -62,10 +64,10 @@ def observed(simulator: Any) -> dict[str, float]:
     return {f"{name}[{i}]": float(x) for name, value in named.items() for i, x in enumerate(np.ravel(value))}
 
 
-def watched(task: str, count: int) -> tuple[Frames, NDArray[np.float32], list[str]]:
+def watched(task: str, count: int, pictures: PictureConfig) -> tuple[Frames, NDArray[np.float32], list[str]]:
     """Frames `[N, S, S, 3]` of the expert and of those who fail, the simulator's observations `[N, O]`, and the names
     of these."""
-    environment = make_environment(task, preset("frames").pictures, task_named(task).episode_steps)
+    environment = make_environment(task, pictures, task_named(task).episode_steps)
     performers = ["expert", *failures_of(task, environment)]
     rng = np.random.default_rng(0)
     frames: list[Frames] = []
@@ -154,13 +156,14 @@ def main() -> None:
     torch.set_num_threads(1)
     config = preset("frames")
     frames_config = with_fields(config.reward.bootifol.frames, arguments.field)
-    model = FrameRewardModel(frames_config, config.pictures.video_size, arguments.seed)
     paths = find_demo_sets(arguments.demos)
+    pictures = replace(config.pictures, video_size=read_manifest(paths["expert"]).video_size)
+    model = FrameRewardModel(frames_config, pictures.video_size, arguments.seed)
     expert, random = (DemoSet.open(paths[kind], verify=False) for kind in ("expert", "random"))
     with progress("aligning", arguments.steps) as advance:
         for _ in islice(model.align(expert, random), arguments.steps):
             advance(1)
-    frames, truth, names = watched(arguments.task, arguments.frames)
+    frames, truth, names = watched(arguments.task, arguments.frames, pictures)
     r2, error = read(as_features(torch.from_numpy(model.states(frames))), torch.from_numpy(truth))
     rows = [
         (name, f"{a:.3f}", f"{b:.4f}", f"{c:.4f}")
