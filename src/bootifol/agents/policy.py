@@ -124,6 +124,28 @@ def read_policy(path: Path) -> Policy:
     Raises:
         BootifolError: the file is missing, damaged, or of another version.
     """
+    networks = read_networks(path)
+    return Policy(_acting(networks), networks.config)
+
+
+@dataclass(frozen=True)
+class PolicyNetworks:
+    """What a policy acts with."""
+
+    config: PolicyConfig
+
+    see: Encoder | Eyes
+    """From pictures to features, or to states of which a stack is the features."""
+
+    decide: Actor
+
+
+def read_networks(path: Path) -> PolicyNetworks:
+    """The networks in a file of `write_policy`, on the CPU. Nothing is unpickled.
+
+    Raises:
+        BootifolError: the file is missing, damaged, or of another version.
+    """
     texts, arrays = read_texts(path, "the policy"), read_arrays(path, "the policy", verify=False)
     if "bootifol" not in texts:
         raise BootifolError(f"{path} holds no policy: name a run, or the policy.safetensors that it wrote")
@@ -132,7 +154,7 @@ def read_policy(path: Path) -> Policy:
         if about["format"] != FORMAT:
             raise ValueError(f"its format is {about['format']}, not {FORMAT}")
         config = PolicyConfig(**about["policy"] | {"pictures": PictureConfig(**about["policy"]["pictures"])})
-        policy = Policy(_rebuilt(config, arrays, **about["networks"]), config)
+        networks = _rebuilt(config, arrays, **about["networks"])
     except (
         BootifolError,
         KeyError,
@@ -146,7 +168,7 @@ def read_policy(path: Path) -> Policy:
             f"{path} holds no policy that this version can rebuild ({told(error)}): use the version that wrote it"
         ) from error
     require_as_written(path, "the policy")  # last, for a sentence that says more goes first
-    return policy
+    return networks
 
 
 def _rebuilt(
@@ -156,7 +178,7 @@ def _rebuilt(
     feature_dim: int,
     hidden_dim: int,
     eyes: Sequence[int] | None = None,
-) -> Act:
+) -> PolicyNetworks:
     stack, size = config.pictures.stack, config.pictures.agent_size
     with torch.device("meta"):  # torch's own initialization would draw from the global generator
         see = Encoder(encoder, 3 * stack, size) if eyes is None else Eyes(size, *eyes)  # type: ignore[arg-type]
@@ -170,8 +192,13 @@ def _rebuilt(
         }
         network.load_state_dict(tensors, assign=True)
     see.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    return PolicyNetworks(config, see, decide)
+
+
+def _acting(networks: PolicyNetworks) -> Act:
+    see, decide = networks.see, networks.decide
     if isinstance(see, Eyes):
-        states = StackedStates(see, stack)
+        states = StackedStates(see, networks.config.pictures.stack)
         encode: Callable[[Tensor], Tensor] = lambda pictures: as_features(states(pictures))  # noqa: E731
     else:
         encode = lambda pictures: see(pictures.float())  # noqa: E731

@@ -73,7 +73,8 @@ class Eyes(nn.Module):
         """Mean places float32 `[N, POINTS]` in [-1, 1] along an axis, of its strongest cells `[N, axis, width]`."""
         chances = self.points(cells).float().softmax(1)
         axis = torch.linspace(-1.0, 1.0, cells.shape[1], device=cells.device)
-        places: Tensor = chances.transpose(1, 2) @ axis
+        # A matrix of one column: onnxruntime 1.32 multiplies what is transposed with a vector wrongly.
+        places: Tensor = (chances.transpose(1, 2) @ axis[:, None]).squeeze(-1)
         return places
 
     def states(self, frames: Frames) -> FrameStates:
@@ -87,10 +88,14 @@ class Eyes(nn.Module):
             for first in range(0, len(frames), _FRAMES_AT_ONCE):
                 part = slice(first, first + _FRAMES_AT_ONCE)
                 seen = self(torch.from_numpy(frames[part]).to(device))
-                whole = torch.round(seen * _LEVELS).clamp_(-127, 127)
-                states[part] = whole.to(torch.int8).cpu().numpy()
+                states[part] = whole_states(seen).cpu().numpy()
         self.train(learning)
         return states
+
+
+def whole_states(seen: Tensor) -> Tensor:
+    """States int8, as they are kept, of what the eyes make of frames, float32 of any shape."""
+    return torch.round(seen * _LEVELS).clamp_(-127, 127).to(torch.int8)
 
 
 def as_features(states: Tensor) -> Tensor:
