@@ -21,6 +21,7 @@ SHARED = {
     "locks",
     "output",
     "files",
+    "hub",
     "devices",
     "gradient_step",
     "progress",

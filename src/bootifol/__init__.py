@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from bootifol.training.api import evaluate_run as evaluate
     from bootifol.training.api import score_videos as score
     from bootifol.training.api import train_policy as train
+    from bootifol.training.policy_export import export_policy as export_policy
     from bootifol.training.saved_policy import load_policy as load_policy
 
 __version__ = version("bootifol")
@@ -46,6 +47,7 @@ _WHERE = {
     "evaluate": ("bootifol.training.api", "evaluate_run"),
     "score": ("bootifol.training.api", "score_videos"),
     "train": ("bootifol.training.api", "train_policy"),
+    "export_policy": ("bootifol.training.policy_export", "export_policy"),
     "load_policy": ("bootifol.training.saved_policy", "load_policy"),
 }
 """Module and name of each public function, imported when first used: `bootifol --help` must not wait for PyTorch."""
@@ -54,6 +56,7 @@ __all__ = [
     "BootifolError",
     "Policy",
     "evaluate",
+    "export_policy",
     "export_videos",
     "import_videos",
     "load_policy",

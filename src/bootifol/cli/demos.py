@@ -92,7 +92,8 @@ def import_(
     """Make a demo set from your own videos: mp4, mov, webm, avi, gif … files, folders of pictures, .npy arrays.
 
     A .npz archive may hold one such array among others. A LeRobot dataset of format v3 (its directory) gives one
-    video an episode: its pictures alone, never its actions or states.
+    video an episode: its pictures alone, never its actions or states. hf://datasets/USER/NAME fetches such files, or
+    such a dataset, from the Hugging Face hub; @REVISION and /FOLDER may follow the name.
 
     A square of every picture, the largest centered one by default, is cut out and resized, after turning it upright,
     stretching pixels that are not square, and putting white behind what is transparent. What was done to which file is

@@ -32,6 +32,7 @@ version this is.
 """
 
 DEMOS_DESCRIPTION = "Make, import, check, match and export sets of videos to learn from."
+POLICY_DESCRIPTION = "Take a trained policy elsewhere."
 EXPERTS_DESCRIPTION = "Train who performs a task in recordings, where none is bundled."
 
 COMMANDS = {
@@ -67,6 +68,10 @@ COMMANDS = {
         "bootifol.cli.table",
         "Print the paper's result tables, scaled and absolute, with the returns of your runs beside the paper's.",
     ),
+    "policy": (
+        "",
+        "Take a trained policy elsewhere, as an ONNX file or a folder for the Hugging Face hub: policy export.",
+    ),
     "experts": ("", "Train an expert for recordings: experts train."),
 }
 """Of each command the module whose function it is, and what it does: the first line of that function's docstring."""
@@ -95,6 +100,8 @@ def _exit_code(words: list[str]) -> int:
     try:
         if words[:1] == ["demos"]:
             return _run(_demos_commands(), words[1:], "bootifol demos", DEMOS_DESCRIPTION)
+        if words[:1] == ["policy"]:
+            return _run(_policy_commands(), words[1:], "bootifol policy", POLICY_DESCRIPTION)
         if words[:1] == ["experts"]:
             return _run(_experts_commands(), words[1:], "bootifol experts", EXPERTS_DESCRIPTION)
         return _run(_command_of(words), words, "bootifol", DESCRIPTION)
@@ -170,6 +177,12 @@ def _demos_commands() -> dict[str, Callable[..., int]]:
     from bootifol.cli.demos import check, export, import_, match, record
 
     return {"record": record, "import": import_, "check": check, "match": match, "export": export}
+
+
+def _policy_commands() -> dict[str, Callable[..., int]]:
+    from bootifol.cli.policy import export
+
+    return {"export": export}
 
 
 def _experts_commands() -> dict[str, Callable[..., int]]:

@@ -6,7 +6,7 @@ import dataclasses
 import math
 import sys
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +15,7 @@ import numpy as np
 
 from bootifol.demos.contact_sheet import write_contact_sheet
 from bootifol.demos.demo_set import DemoSet, listed
+from bootifol.demos.kinds import PICTURE_SUFFIXES, VIDEO_SUFFIXES
 from bootifol.demos.lerobot import LeRobotEpisode, lerobot_episodes
 from bootifol.demos.manifest import Manifest, Shard, VideoEntry, installed_versions, write_manifest
 from bootifol.demos.shards import (
@@ -28,6 +29,7 @@ from bootifol.demos.video_files import frame_rate, is_lerobot_dataset, stream_vi
 from bootifol.envs.pictures import centered_square, resize
 from bootifol.errors import BootifolError, BootifolWarning, collected_warnings, warn
 from bootifol.files import remove_leftovers, written_aside
+from bootifol.hub import fetched_folder, hub_address, is_hub_address
 from bootifol.locks import one_writer
 from bootifol.progress import progress
 from bootifol.types import Frame, Frames
@@ -41,6 +43,12 @@ Crop = tuple[int, int, int]
 LONGEST_STILL = 20_000
 """Times that one picture of a file is taken in a row, at most: thirteen minutes at 25 a second. Damaged time stamps ask
 for any number."""
+
+READ_SUFFIXES = (*sorted(VIDEO_SUFFIXES | PICTURE_SUFFIXES), ".npy", ".npz")
+"""Of files that are fetched from a hub."""
+
+LEROBOT_TABLES = ("meta",)
+"""Folders of a LeRobot dataset that say what its videos are; those with actions stay where they are."""
 
 LARGEST_SQUARE = "largest centered square"
 """How a manifest names the crop that nobody chose."""
@@ -83,7 +91,7 @@ class Conversion:
 
 
 def import_videos(
-    files: Sequence[Path],
+    files: Sequence[Path | str],
     out: Path | str,
     conversion: Conversion | None = None,
     behavior: str = "expert",
@@ -94,7 +102,8 @@ def import_videos(
 
     Args:
         files: video files, folders of them or of the pictures of one video, .npy and .npz arrays, and LeRobot
-            datasets (each episode one video), as `video_paths` finds them.
+            datasets (each episode one video), as `video_paths` finds them; and addresses `hf://datasets/USER/NAME`
+            of the Hugging Face hub, of which what is such a file is fetched (the extra `hub`).
         out: directory of the set; it must not exist.
         conversion: frame rate, length and size of the result.
         behavior: what the videos show.
@@ -113,16 +122,27 @@ def import_videos(
     if not files:
         raise BootifolError("there are no videos to import: name files, or folders of pictures")
     name = name or f"{out.resolve().parent.name}-{behavior}"
-    sources = _sources(video_paths(files), camera)
+    fetched = _fetched(files)
+    sources = _sources(video_paths([fetched.get(file, Path(file)) for file in files]), camera)
+    origins = {folder: str(hub_address(file)) for file, folder in fetched.items()}
     with one_writer(out, out.parent / f".{out.name}.lock"):
         remove_leftovers(out.parent, out)
         if out.exists():
             raise BootifolError(f"{out} exists by now: another process has imported videos there")
         with written_aside(out) as aside:
             aside.mkdir()
-            _write_set(aside, sources, conversion, behavior, name)
+            _write_set(aside, sources, conversion, behavior, name, origins)
             write_contact_sheet(aside, DemoSet.open(aside))
     return DemoSet.open(out)
+
+
+def _fetched(files: Sequence[Path | str]) -> dict[Path | str, Path]:
+    """Where what has an address of the Hugging Face hub lies on this machine."""
+    return {
+        file: fetched_folder(hub_address(file), READ_SUFFIXES, LEROBOT_TABLES)
+        for file in files
+        if is_hub_address(file)
+    }
 
 
 def read_recordings(
@@ -208,12 +228,16 @@ def _rate(source: Source) -> float | None:
     return source.frames_per_second if isinstance(source, LeRobotEpisode) else frame_rate(source)
 
 
-def _described(source: Source) -> dict[str, Any]:
-    """Where a recording comes from, for the manifest."""
+def _described(source: Source, origins: Mapping[Path, str]) -> dict[str, Any]:
+    """Where a recording comes from, for the manifest; `origins` are the addresses of what was fetched."""
+    place = source.dataset if isinstance(source, LeRobotEpisode) else source
+    addresses = [address for folder, address in origins.items() if place.is_relative_to(folder)]
+    address = {"address": addresses[0]} if addresses else {}
     if isinstance(source, LeRobotEpisode):
-        dataset = source.dataset.resolve().name
-        return {"file": dataset, "episode": source.index, "camera": source.camera}
-    return {"file": source.name}
+        # A fetched data set lies in a folder that is named after its commit.
+        name = addresses[0].rpartition("/")[2] if addresses else source.dataset.resolve().name
+        return {"file": name, "episode": source.index, "camera": source.camera} | address
+    return {"file": source.name} | address
 
 
 def _resampled(source: Source, frames_per_second: float | None) -> Iterator[Frame]:
@@ -288,7 +312,12 @@ def _tell(notes: Sequence[BootifolWarning]) -> None:
 
 
 def _write_set(
-    directory: Path, sources: Sequence[Source], conversion: Conversion, behavior: str, name: str
+    directory: Path,
+    sources: Sequence[Source],
+    conversion: Conversion,
+    behavior: str,
+    name: str,
+    origins: Mapping[Path, str],
 ) -> None:
     video_bytes = conversion.frames * conversion.size**2 * 3
     per_shard = videos_per_shard(None, video_bytes)
@@ -307,7 +336,8 @@ def _write_set(
                         entries.append(
                             VideoEntry(
                                 name=f"{name}-{len(entries):06d}",
-                                source=_described(source) | {"first_frame": window * conversion.frames},
+                                source=_described(source, origins)
+                                | {"first_frame": window * conversion.frames},
                                 length=len(frames),
                                 sha256=sha256_of_frames(padded),
                             )

@@ -46,8 +46,8 @@ class VideoEntry:
     name: str
     source: dict[str, Any]
     """Where it comes from: `{"behavior", "seed"}` when recorded, `{"file", "first_frame"}` when imported, with
-    `"episode"` and `"camera"` when the file is a LeRobot dataset, and `"notes"` where there was a choice how to read
-    it."""
+    `"episode"` and `"camera"` when the file is a LeRobot dataset, `"address"` when it was fetched from a hub, and
+    `"notes"` where there was a choice how to read it."""
     length: int
     """Frames that were seen. A shorter video stands still on its last frame until the set's length."""
     sha256: str

@@ -85,15 +85,20 @@ def svg_data_uri(figure: Figure) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode("ascii")
 
 
-def save_png(figure: Figure, out: Path) -> Path:
+def save_png(figure: Figure, out: Path, dots_per_inch: float | None = None) -> Path:
     """Writes the figure, whole or not at all, and returns its path.
+
+    Args:
+        figure: what is drawn.
+        out: the file.
+        dots_per_inch: by default the figure's own.
 
     Raises:
         BootifolError: the file's name does not end in .png, or it cannot be written.
     """
     require_png(out)
     with house_style(), written_aside(out) as aside:
-        figure.savefig(aside, format="png")
+        figure.savefig(aside, format="png", dpi=dots_per_inch or "figure")
     return out
 
 

@@ -9,6 +9,7 @@ from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.policy import Policy, PolicyConfig, read_policy, write_policy
 from bootifol.envs.pixels import PixelEnvironment
 from bootifol.errors import BootifolError
+from bootifol.hub import fetched_file, hub_address, is_hub_address
 from bootifol.training.checkpoint import Progress, load_checkpoint, newest_checkpoint
 from bootifol.training.components import build_agent, build_environment, build_reward_model, reads_pictures
 from bootifol.training.run_config import RunConfig
@@ -24,16 +25,19 @@ def load_policy(run: AnyPath, trust: bool = False) -> Policy:
     environment's packages.
 
     Args:
-        run: the run's directory, or its `policy.safetensors` alone, wherever it was copied to.
+        run: the run's directory, or its `policy.safetensors` alone, wherever it was copied to; or `hf://USER/NAME`, the
+            address of a model on the Hugging Face hub, of which that file alone is fetched (the extra `hub`).
         trust: whether code that the run's `config.json` names may be imported; `policy.safetensors` needs none.
 
     Returns:
         A policy whose actions are bit for bit those of `evaluate` on the CPU.
 
     Raises:
-        BootifolError: there is no run, it has no checkpoint yet, a file is damaged, or it names code that is not
-            trusted.
+        BootifolError: there is no run, it has no checkpoint yet, a file is damaged or cannot be fetched, or it names
+            code that is not trusted.
     """
+    if is_hub_address(run):
+        return read_policy(fetched_file(hub_address(run), NAME))
     path = Path(run)
     file = path / NAME if path.is_dir() else path
     if file.is_file():
