@@ -1,4 +1,7 @@
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import av
@@ -110,3 +113,14 @@ def test_statistics_of_all_frames_agree_with_numpy(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         np.ravel(first[f"stats/{CAMERA}/mean"]), frames[0].reshape(-1, 3).mean(0) / 255
     )
+
+
+@pytest.mark.skipif("LEROBOT_PYTHON" not in os.environ, reason="LeRobot wants an environment of its own")
+def test_lerobot_reads_it() -> None:
+    """LEROBOT_PYTHON is a Python that has LeRobot; scripts/check_lerobot.sh says how to make one."""
+    script = Path(__file__).parents[2] / "scripts" / "check_lerobot.sh"
+    done = subprocess.run(
+        ["bash", script], env=os.environ | {"PYTHON": sys.executable}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert "reads it: 3 episodes, 93 frames at 10 a second" in done.stdout
