@@ -9,8 +9,8 @@
 #   LEROBOT_VENV    where LeRobot is installed, if it is not there yet; by default a folder beside the temporary files.
 #                   Never bootifol's own environment: LeRobot wants other versions of PyTorch and PyAV.
 #   LEROBOT_PYTHON  a Python that has LeRobot already; nothing is installed then.
-#   TORCH_INDEX     where PyTorch comes from. PyPI's for Linux brings CUDA, about 4 GB to download;
-#                   https://download.pytorch.org/whl/cpu has one without, well under 1 GB.
+#   TORCH_INDEX     where PyTorch comes from. PyPI's for Linux brings CUDA, several gigabytes to download;
+#                   https://download.pytorch.org/whl/cpu has one without.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 python=${PYTHON:-.venv/bin/python}
