@@ -19,7 +19,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 LEFT_OUT = shutil.ignore_patterns(
-    ".*", "__pycache__", "*.egg-info", "build", "dist", "runs", "demos", "demo", "*.pyc"
+    ".*", "__pycache__", "*.egg-info", "build", "dist", "site", "runs", "demos", "demo", "*.pyc"
 )
 """Of the checkout: what git ignores, and git's own."""
 

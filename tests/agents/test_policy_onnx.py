@@ -12,6 +12,7 @@ import pytest
 import torch
 
 from bootifol.agents import policy_onnx
+from bootifol.agents.config import DrQv2Config
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.encodings import StackedStates
 from bootifol.agents.policy import Policy, PolicyConfig, read_networks, read_policy, write_policy
@@ -25,7 +26,8 @@ onnx = pytest.importorskip("onnx")
 onnxruntime = pytest.importorskip("onnxruntime")
 pytest.importorskip("onnxscript")
 
-from test_policy import AGENT, CONFIG  # noqa: E402
+AGENT = DrQv2Config(encoder="strided", feature_dim=8, hidden_dim=16, ema_decay=0.9)
+CONFIG = PolicyConfig("drawn_reach", 120, 2, action_repeat=2, frames_per_second=5.0, pictures=PictureConfig())
 
 ROUNDING = 1e-5
 """Actions differ by a few 1e-7."""
