@@ -55,7 +55,7 @@ def build_wheel(directory: Path) -> Path:
     """Of this checkout; built from a copy, so that nothing is left behind in it."""
     copy = directory / "copy"
     shutil.copytree(ROOT / "src", copy / "src", ignore=shutil.ignore_patterns("*.egg-info", "__pycache__"))
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, copy / name)
     run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", directory, copy])
     (wheel,) = directory.glob("*.whl")
