@@ -44,7 +44,7 @@ from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.run_directory import require_resumable, require_unused, writing_run
 
-CONFIG = replace(ENDS_SOON, tensorboard=True)
+CONFIG = replace(ENDS_SOON, tracker="tensorboard")
 COLUMNS = ("promise", "tries", "held")
 SENTENCE = 2
 TRACEBACK = 1
@@ -129,7 +129,7 @@ def at_call(number: int, act: Callable[[], None]) -> Iterator[list[str]]:
         (files, "_sync"),
         (files, "seal"),
         (shutil, "rmtree"),
-        (tracking.Tracker, "_append"),
+        (tracking.RunLog, "_append"),
         (os, "fsync"),
         (SummaryWriter, "add_scalar"),
     ]

@@ -224,7 +224,7 @@ def shortened(config: TrainingConfig) -> TrainingConfig:
         agent=replace(config.agent, warm_up_steps=1),
         demonstrations=demonstrations,
         evaluation=replace(config.evaluation, held_out_videos=0),
-        tensorboard=False,
+        tracker="none",
     )
 
 

@@ -38,7 +38,7 @@ from bootifol.demos.augmentation import augmented
 from bootifol.progress import progress
 from bootifol.reports.markdown import markdown_table
 from bootifol.rewards.references import draw_references
-from bootifol.tracking import Tracker
+from bootifol.tracking import RunLog
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
@@ -226,13 +226,13 @@ def measure(
     steps = config.interactive.agent_steps
     arithmetic = measured_rates().arithmetic
     with tempfile.TemporaryDirectory() as temporary:
-        short = replace(config, tensorboard=False)
+        short = replace(config, tracker="none")
         run = Run(
             RunConfig(task, method, preset, 1, str(demos), None, short), Path(temporary), Console(stderr=True)
         )
         warm_up(run)
         rows = []
-        run.tracker = Tracker(Path(temporary), tensorboard=False)
+        run.log = RunLog(Path(temporary))
         for stage in stages_of(run):
             each = milliseconds(stage, runs)
             rows.append((stage, each, arithmetic_milliseconds(stage, arithmetic)))

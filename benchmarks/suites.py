@@ -297,7 +297,7 @@ SMALL: Overrides = (
     ("agent.warm_up_steps", 60),
     ("alignment.gradient_steps", 4),
     ("interactive.agent_steps", 240),
-    ("tensorboard", False),
+    ("tracker", "none"),
 )
 
 

@@ -23,7 +23,7 @@ def test_the_readmes_lines_run(tmp_path: Path) -> None:
         config,
         alignment=replace(config.alignment, gradient_steps=3),
         interactive=replace(config.interactive, agent_steps=300),
-        tensorboard=False,
+        tracker="none",
     )
     demos, out = str(tmp_path / "demos"), str(tmp_path / "run")
     bootifol.record_demos("drawn_reach", demos, episodes=12, pictures=pictures)

@@ -52,7 +52,7 @@ def make():
 TASK = "robot_of_a_test:make"
 LENGTHS = ["--action-repeat", "2", "--episode-steps", "15"]
 SMALL_RUN = [
-    *("--task", TASK, *LENGTHS, "--preset", "smoke", "--threads", "1", "--tensorboard", "False"),
+    *("--task", TASK, *LENGTHS, "--preset", "smoke", "--threads", "1", "--tracker", "none"),
     *("--pictures.agent-size", "32", "--pictures.video-size", "32", "--agent.encoder", "strided"),
     *("--reward.bootifol.width-divisor", "32", "--reward.bootifol.videos-per-class", "2"),
     *("--alignment.gradient-steps", "6", "--interactive.agent-steps", "150", "--evaluation.every", "75"),

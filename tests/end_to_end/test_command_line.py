@@ -24,7 +24,7 @@ from bootifol.types import FrameBatch
 
 SMALL = ["--agent-size", "32", "--video-size", "32"]
 SMALL_RUN = [
-    *("--task", "drawn_reach", "--preset", "smoke", "--threads", "1", "--tensorboard", "False"),
+    *("--task", "drawn_reach", "--preset", "smoke", "--threads", "1", "--tracker", "none"),
     *("--pictures.agent-size", "32", "--pictures.video-size", "32", "--agent.encoder", "strided"),
     *("--reward.bootifol.width-divisor", "32", "--reward.bootifol.videos-per-class", "2"),
     *("--alignment.gradient-steps", "6", "--interactive.agent-steps", "300", "--evaluation.every", "150"),
@@ -289,7 +289,7 @@ def test_the_first_tour_can_be_copied(tmp_path: Path, monkeypatch: pytest.Monkey
     record, train, evaluate, report = (shlex.split(line)[1:] for line in tour.splitlines())
     record[record.index("150")] = "20"
     assert main(record) == 0
-    shorter = ["--alignment.gradient-steps", "2", "--interactive.agent-steps", "60", "--tensorboard", "False"]
+    shorter = ["--alignment.gradient-steps", "2", "--interactive.agent-steps", "60", "--tracker", "none"]
     shorter += ["--evaluation.final-episodes", "1", "--evaluation.showcase-episodes", "1"]
     assert main([*train, *shorter]) == 0
     assert main([*evaluate, "--episodes", "1"]) == 0

@@ -26,7 +26,7 @@ from bootifol.types import Rewards, Video
 
 TASK = "drawn_home"
 CONFIG = replace(
-    DRAWN_PIXELS, threads=1, tensorboard=False, evaluation=replace(DRAWN_PIXELS.evaluation, every=10**9)
+    DRAWN_PIXELS, threads=1, tracker="none", evaluation=replace(DRAWN_PIXELS.evaluation, every=10**9)
 )
 PICTURES = CONFIG.pictures
 

@@ -25,7 +25,7 @@ TASK = "drawn_reach"
 CONFIG = replace(
     DRAWN,
     threads=1,
-    tensorboard=False,
+    tracker="none",
     alignment=replace(DRAWN.alignment, gradient_steps=350),
     interactive=replace(DRAWN.interactive, agent_steps=3000),
     evaluation=replace(DRAWN.evaluation, every=10**9, sight_episodes=0),

@@ -11,7 +11,7 @@ from tiny_runs import ENDS_SOON, new_run
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.evaluation.returns import evaluation_seeds
 from bootifol.evaluation.tables import read_evaluations
-from bootifol.tracking import Tracker
+from bootifol.tracking import RunLog
 from bootifol.training.api import evaluate_run
 from bootifol.training.interactive import episode_seed
 from bootifol.types import Action, Observation
@@ -53,7 +53,7 @@ def test_what_is_measured_is_played_without_noise(
 
     monkeypatch.setattr(DrQv2, "act", watched)
     run = new_run(tmp_path / "run", demos, config=ENDS_SOON)
-    run.tracker = Tracker(run.directory, tensorboard=False)
+    run.log = RunLog(run.directory)
     for measure in (
         run.measurements.returns_on_the_way,
         run.measurements.final_returns,

@@ -40,6 +40,17 @@ def test_a_run_of_before_devices_takes_the_one_at_hand(tmp_path: Path) -> None:
     assert RunConfig.read(tmp_path).training.device == "auto"
 
 
+@pytest.mark.parametrize(("was", "tracker"), [(True, "tensorboard"), (False, "none")])
+def test_a_run_of_before_trackers_logs_where_it_did(tmp_path: Path, was: bool, tracker: str) -> None:
+    RunConfig("drawn_reach", "bootifol", "cpu", 3, "demos", None, CPU).write(tmp_path, [])
+    path = tmp_path / "config.json"
+    data = json.loads(path.read_text())
+    del data["config"]["tracker"]
+    data["config"]["tensorboard"] = was
+    path.write_text(json.dumps(data))
+    assert RunConfig.read(tmp_path).training == replace(CPU, tracker=tracker)
+
+
 def test_a_directory_without_a_run_is_named(tmp_path: Path) -> None:
     with pytest.raises(BootifolError, match="is not a run"):
         RunConfig.read(tmp_path)
@@ -54,6 +65,7 @@ def test_a_directory_without_a_run_is_named(tmp_path: Path) -> None:
         (("config", "agent", "batch_size"), 1.5, "says that batch_size is 1.5"),
         (("config", "agent", "learning_rate"), -1e-4, "agent: learning_rate must be positive"),
         (("config", "tensorboard"), 1, "says that tensorboard is 1"),
+        (("config", "tracker"), "wand", "says that tracker is 'wand'"),
         (("config", "alignment", "time_share"), 3.0, "alignment: time_share must lie in"),
         (("seed",), "x", "says that seed is 'x'"),
         (("seed",), -1, "seed must be at least 0"),

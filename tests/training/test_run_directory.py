@@ -20,7 +20,7 @@ from bootifol.demos.demo_set import DemoSet
 from bootifol.errors import BootifolError
 from bootifol.files import read_json
 from bootifol.locks import one_writer
-from bootifol.tracking import Tracker, cut_metrics
+from bootifol.tracking import RunLog, TensorBoard, cut_metrics
 from bootifol.training import components
 from bootifol.training.api import continue_run, train_policy
 from bootifol.training.checkpoint import newest_checkpoint
@@ -123,13 +123,13 @@ def test_metrics_shorter_than_the_checkpoint_knows_get_no_zeros(run: Path) -> No
 
 
 def test_tensorboard_drops_what_was_undone(tmp_path: Path) -> None:
-    with Tracker(tmp_path) as tracker:
+    with RunLog(tmp_path, TensorBoard(tmp_path)) as tracker:
         tracker.log("alignment", "gradient_step", 4000, 0.0, {"loss/total": 2.0})
         tracker.log("interactive", "agent_steps", 60, 0.0, {"loss/total": 1.0})
         at_checkpoint = tracker.bytes_written()
         tracker.log("interactive", "agent_steps", 120, 0.0, {"loss/total": 0.0})
     cut_metrics(tmp_path / "metrics.jsonl", at_checkpoint)
-    with Tracker(tmp_path) as tracker:
+    with RunLog(tmp_path, TensorBoard(tmp_path)) as tracker:
         tracker.log("interactive", "agent_steps", 90, 0.0, {"loss/total": 0.5})
     events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
     assert [(e.step, e.value) for e in events.Scalars("interactive/loss/total")] == [(60, 1.0), (90, 0.5)]
@@ -140,10 +140,10 @@ def test_tensorboard_drops_what_was_undone(tmp_path: Path) -> None:
 def test_a_full_disk_at_a_line_of_metrics_is_a_sentence(
     tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
-    run = new_run(tmp_path / "run", demos, config=replace(ENDS_SOON, tensorboard=True))
-    owner = Tracker if where == "_append" else "torch.utils.tensorboard.SummaryWriter"
+    run = new_run(tmp_path / "run", demos, config=replace(ENDS_SOON, tracker="tensorboard"))
+    owner = RunLog if where == "_append" else "torch.utils.tensorboard.SummaryWriter"
     calls: list[object] = []
-    whole = Tracker._append
+    whole = RunLog._append
 
     def full(*arguments: object, **_: object) -> None:
         calls.append(arguments)

@@ -25,7 +25,7 @@ TINY = replace(
     pictures=PICTURES,
     device="cpu",  # what must hold bit for bit does so there
     threads=1,
-    tensorboard=False,
+    tracker="none",
     reward=RewardConfig(
         replace(SMOKE.reward.bootifol, width_divisor=32, videos_per_class=2),
         virl=replace(SMOKE.reward.virl, width_divisor=32, videos_per_class=2),

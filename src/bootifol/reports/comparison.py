@@ -18,8 +18,8 @@ from bootifol.reports.final_return import final_return
 from bootifol.reports.names import LEARN_NOTHING, METHOD_NAMES, agent_name, task_title
 from bootifol.reports.run_files import RunFiles, flattened
 
-IRRELEVANT = {"checkpoint_minutes", "tensorboard"}
-"""Fields of a configuration that change no number of a run."""
+IRRELEVANT = {"checkpoint_minutes", "tracker", "tensorboard"}
+"""Fields of a configuration that change no number of a run; `tensorboard` is of old runs."""
 
 BUDGET = ("time_budget", "interactive.agent_steps")
 

@@ -116,6 +116,7 @@ def train_policy(
     with output_may_fail(), writing_run(directory):
         require_unused(directory)
         learner = Run(run, directory, _console())
+        learner.begin_tracker()
         run.write(directory, list(command))
         return TrainedRun(directory, finished=_learn_and_report(learner))
 
@@ -283,9 +284,11 @@ def _learn_and_report(run: Run) -> bool:
     try:
         run.finish()
     except Stopped:
+        run.log.close()
         run.console.print(f"stopped before its last measurements. {run.how_to_resume()}")
         return False
     target = report([run.directory], run.directory / "report.html")
+    run.publish(target)
     run.console.print(f"report: {target}")
     return True
 

@@ -15,11 +15,13 @@ from bootifol.errors import (
     fields_of,
     require_at_least,
     require_at_most,
+    require_choices,
     require_positive,
     require_reasonable,
     require_share,
 )
 from bootifol.rewards.registry import RewardConfig
+from bootifol.tracking import TrackerName
 from bootifol.training.demonstrations import DemonstrationConfig
 
 
@@ -162,11 +164,14 @@ class TrainingConfig:
     checkpoint_minutes: float = 20.0
     """Minutes between two checkpoints; one is also written at the end and when the run is interrupted."""
 
-    tensorboard: bool = True
-    """Also write TensorBoard event files."""
+    tracker: TrackerName = "tensorboard"
+    """Where metrics go beside metrics.jsonl. tensorboard: event files in the run, where TensorBoard is installed.
+    wandb: Weights & Biases (extra `wandb`), with the showcase's videos and the report; WANDB_MODE=offline keeps all of
+    it in the run. none: nowhere else."""
 
     def __post_init__(self) -> None:
         check_device_name(self.device)
+        require_choices("training", self)
         lengths = ("action_repeat", "episode_steps", "evaluation_steps")
         require_at_least(1, threads=self.threads, **fields_of("training", self, *lengths))
         require_at_most(MOST_THREADS, threads=self.threads)

@@ -131,7 +131,7 @@ class RunConfig:
                     for name in hints
                     if name != "training"
                 },
-                training=from_json(TrainingConfig, data["config"], path),
+                training=from_json(TrainingConfig, todays_fields(data["config"], path), path),
             )
         except KeyError as error:
             raise BootifolError(f"{path} lacks {error}; restore the file or start a new run") from error
@@ -153,6 +153,19 @@ def require_time_to_act(config: TrainingConfig) -> None:
             f"alignment.time_share {alignment:g} and demonstrations.time_share {cloning:g} of the time budget leave "
             "less than half for acting and learning: lower one of them"
         )
+
+
+def todays_fields(data: Any, path: Path) -> Any:
+    """A configuration's fields under today's names: `tensorboard`, true or false, became `tracker`.
+
+    Raises:
+        BootifolError: an old field has a value that it could not have.
+    """
+    if not isinstance(data, dict) or "tensorboard" not in data:
+        return data
+    wanted = _checked(data["tensorboard"], bool, "tensorboard", path)
+    others = {name: value for name, value in data.items() if name != "tensorboard"}
+    return {"tracker": "tensorboard" if wanted else "none"} | others
 
 
 def from_json(kind: type[_Config], data: Any, path: Path) -> _Config:

@@ -16,7 +16,7 @@ from bootifol.training.run_config import RunConfig
 MEASURED = ("metrics.jsonl", "evaluations.csv", "ranking.csv", "policy.safetensors", "showcase.safetensors")
 """What stands in a run's directory once something was learned."""
 
-WRITTEN = ("config.json", *MEASURED, "checkpoints", "videos", "tensorboard", "report.html")
+WRITTEN = ("config.json", *MEASURED, "checkpoints", "videos", "tensorboard", "wandb", "report.html")
 """All that a run writes."""
 
 

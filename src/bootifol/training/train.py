@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shlex
 import time
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from bootifol.memory import keep_freed_memory
 from bootifol.own_modules import imports_code
 from bootifol.progress import progress
 from bootifol.rewards.registry import check_method
-from bootifol.tracking import Averages, Tracker, cut_metrics
+from bootifol.tracking import Averages, RunLog, Tracker, cut_metrics, make_tracker, require_tracker
 from bootifol.training.alignment import alignment_phase
 from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.checkpoint import (
@@ -65,6 +66,7 @@ class Run:
         keep_freed_memory()
         self.task = self.run.resolved_task()
         check_method(self.run.method)
+        require_tracker(config.tracker)
         device = chosen_device(config.device)
         if device != "cpu":
             self.console.print(f"computing on {device}, which has not been tried yet; --device cpu has")
@@ -77,6 +79,7 @@ class Run:
         self.counters = Counters()
         self.rng = np.random.default_rng([self.run.seed, 3])
         self.interruption = Interruption()
+        self._tracker: Tracker | None = None
         self._metrics_bytes = 0
         checkpoint = self._resume()
         self.budget = Budget(
@@ -119,6 +122,21 @@ class Run:
         )
         self._saved_at = time.monotonic()
 
+    def begin_tracker(self) -> None:
+        """Begins the tracker, if it has not begun: of a new run before `config.json` is written, for it may refuse.
+
+        Raises:
+            BootifolError: it refuses, and has left nothing.
+        """
+        if self._tracker is not None:
+            return
+        name = self.run.training.tracker
+        if name == "wandb":
+            self.console.print(
+                "metrics, videos and the report go to Weights & Biases, too, as the configuration says (tracker wandb)"
+            )
+        self._tracker = make_tracker(name, self.directory, asdict(self.run))
+
     def learn(self) -> bool:
         """Both phases.
 
@@ -128,7 +146,8 @@ class Run:
         self._undo_what_followed_the_checkpoint()
         if newest_checkpoint(self.directory / "checkpoints") is not None:
             RunConfig.note_resumed(self.directory, self.counters.agent_steps)
-        self.tracker = Tracker(self.directory, self.run.training.tensorboard)
+        self.begin_tracker()
+        self.log = RunLog(self.directory, self._tracker)
         with self.interruption as interruption:
             try:
                 if newest_checkpoint(self.directory / "checkpoints") is None:
@@ -141,6 +160,9 @@ class Run:
                 raise BootifolError(f"{error}. {self.how_to_resume()}") from error
             except BootifolError as error:
                 raise BootifolError(f"{error}. {self.how_to_resume()}") from error
+            except Exception:
+                self.log.close()
+                raise
 
     def finish(self) -> Metrics:
         """The measurements of a run that has ended: final returns, ranking, showcase.
@@ -156,8 +178,12 @@ class Run:
             returns = self.measurements.final_returns()
             self.measurements.rank()
             self.measurements.showcase()
-        self.tracker.close()
         return returns
+
+    def publish(self, page: Path) -> None:
+        """Shows the tracker the report and the videos of a run that has ended, and closes the log."""
+        self.log.report(page, sorted((self.directory / "videos").glob("*.mp4")))
+        self.log.close()
 
     def how_to_resume(self) -> str:
         """The command that goes on with the run."""
@@ -297,7 +323,7 @@ class Run:
         return True
 
     def _log(self, phase: str, count_name: str, count: int, metrics: Metrics) -> None:
-        self.tracker.log(phase, count_name, count, self.counters.seconds, metrics)
+        self.log.log(phase, count_name, count, self.counters.seconds, metrics)
 
     def _shown(self) -> dict[str, float]:
         """What stands beside the progress bar."""
@@ -334,7 +360,7 @@ class Run:
             self._checkpoint()
 
     def _checkpoint(self) -> None:
-        self._metrics_bytes = self.tracker.bytes_written()
+        self._metrics_bytes = self.log.bytes_written()
         save_checkpoint(
             self.directory / "checkpoints",
             Progress(self.counters, dict(self.rng.bit_generator.state), self._metrics_bytes),
@@ -357,6 +383,6 @@ class Run:
 
     def _stop(self) -> bool:
         self._checkpoint()
-        self.tracker.close()
+        self.log.close()
         self.console.print(f"stopped after a checkpoint. {self.how_to_resume()}")
         return False
