@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from bootifol.demos.import_videos import import_videos as import_videos
     from bootifol.demos.record import record_demos as record_demos
     from bootifol.errors import BootifolError as BootifolError
+    from bootifol.presets import preset as preset
     from bootifol.reports.html import report as report
     from bootifol.reports.table_files import table as table
     from bootifol.training.api import continue_run as resume
@@ -41,6 +42,7 @@ _WHERE = {
     "record_demos": ("bootifol.demos.record", "record_demos"),
     "Policy": ("bootifol.agents.policy", "Policy"),
     "BootifolError": ("bootifol.errors", "BootifolError"),
+    "preset": ("bootifol.presets", "preset"),
     "report": ("bootifol.reports.html", "report"),
     "table": ("bootifol.reports.table_files", "table"),
     "resume": ("bootifol.training.api", "continue_run"),
@@ -60,6 +62,7 @@ __all__ = [
     "export_videos",
     "import_videos",
     "load_policy",
+    "preset",
     "record_demos",
     "report",
     "resume",

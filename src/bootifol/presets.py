@@ -292,10 +292,10 @@ WITHOUT_EYES = {"drawn": "drawn_pixels", "frames": "cpu", "demo": "cpu"}
 
 
 def preset(name: str, method: str = "bootifol") -> TrainingConfig:
-    """Looks a preset up.
+    """A preset's configuration, frozen: `dataclasses.replace`, or `overrides` of `bootifol.train`, change it.
 
     Args:
-        name: of the preset.
+        name: of the preset: paper, cpu, long, frames, backbone, drawn, drawn_pixels, demo or smoke.
         method: whose run it is for. One whose reward has no eyes gets another in its place (`WITHOUT_EYES`).
 
     Raises:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,10 @@ from bootifol.cli.main import main
 from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
+from bootifol.presets import CPU, SMOKE
 from bootifol.training import api
 from bootifol.training.api import TrainedRun
+from bootifol.training.overrides import field_kinds
 
 EIGHT = PictureConfig(agent_size=8, video_size=8)
 
@@ -110,3 +112,119 @@ def test_what_was_typed_is_no_flag(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["train", "--help"])
     assert "--words" not in capsys.readouterr().out
+
+
+CONFIG = """
+task: drawn_reach
+method: virl
+preset: smoke
+seed: 5
+time_budget: 2m
+agent: {batch_size: 9, n_step: 2}
+"""
+
+
+def test_a_file_configures_and_what_is_typed_goes_before_it(tmp_path: Path, trainings: Trainings) -> None:
+    file = tmp_path / "run.yaml"
+    file.write_text(CONFIG)
+    words = ["train", "--config", str(file), "--demos", "demos", "--out", "run"]
+    assert main(words) == 0
+    assert trainings.called is not None
+    told = {name: trainings.called[name] for name in ("task", "method", "preset", "seed", "time_budget")}
+    assert told == {"task": "drawn_reach", "method": "virl", "preset": "smoke", "seed": 5, "time_budget": 120}
+    config = trainings.called["config"]
+    assert config == replace(SMOKE, agent=replace(SMOKE.agent, batch_size=9, n_step=2))
+    typed = [
+        "--method=gaifo",
+        "--seed",
+        "6",
+        "--agent.n-step",
+        "4",
+        "--time-budget",
+        "None",
+        "--preset",
+        "cpu",
+    ]
+    assert main([*words, *typed]) == 0
+    told = {name: trainings.called[name] for name in ("task", "method", "preset", "seed", "time_budget")}
+    assert told == {"task": "drawn_reach", "method": "gaifo", "preset": "cpu", "seed": 6, "time_budget": None}
+    assert trainings.called["config"] == replace(CPU, agent=replace(CPU.agent, batch_size=9, n_step=4))
+
+
+def test_a_file_may_say_where_videos_and_run_are(tmp_path: Path, trainings: Trainings) -> None:
+    file = tmp_path / "run.yaml"
+    file.write_text(f"{CONFIG}\ndemos: demos/mine\nout: runs/mine")
+    assert main(["train", "--config", str(file)]) == 0
+    assert trainings.called is not None
+    assert (trainings.called["demos"], trainings.called["out"]) == (Path("demos/mine"), Path("runs/mine"))
+    assert main(["train", "--config", str(file), "--out", "runs/other"]) == 0
+    assert trainings.called["out"] == Path("runs/other")
+
+
+def test_the_printed_configuration_is_the_same_one_read_back(
+    tmp_path: Path, trainings: Trainings, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, again = tmp_path / "run.yaml", tmp_path / "again.yaml"
+    file.write_text(CONFIG)
+    assert main(["train", "--config", str(file), "--agent.n-step", "4", "--print-config"]) == 0
+    again.write_text(capsys.readouterr().out)
+    assert trainings.called is None, "nothing is trained"
+    assert main(["train", "--config", str(again), "--print-config"]) == 0
+    assert capsys.readouterr().out == again.read_text()
+    assert main(["train", "--config", str(again), "--demos", "demos", "--out", "run"]) == 0
+    assert trainings.called is not None
+    assert trainings.called["config"].agent.n_step == 4 and trainings.called["time_budget"] == 120
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("agent: {batchsize: 3}", "there is no field 'agent.batchsize'; the nearest is agent.batch_size"),
+        ("agent: {batch_size: -3}", "agent: batch_size must be at least 1, not -3"),
+        ("preset: gpu", "there is no preset 'gpu'"),
+        ("task: my_robot:make", "names the task 'my_robot:make', which is code of its author's"),
+        (
+            "task: drawn_reach\nmethod: mine:Mine",
+            "names the method 'mine:Mine', which is code of its author's",
+        ),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_named(
+    tmp_path: Path, trainings: Trainings, capsys: pytest.CaptureFixture[str], text: str, sentence: str
+) -> None:
+    file = tmp_path / "run.yaml"
+    file.write_text(text)
+    assert main(["train", "--config", str(file), "--demos", "demos", "--out", "run"]) == 2
+    said = capsys.readouterr().err
+    assert str(file) in said and sentence in said
+    assert trainings.called is None
+
+
+def test_code_that_a_file_names_may_be_typed_or_trusted(tmp_path: Path, trainings: Trainings) -> None:
+    file = tmp_path / "run.yaml"
+    file.write_text("task: my_robot:make\nmethod: mine:Mine\npreset: smoke")
+    words = ["train", "--config", str(file), "--demos", "demos", "--out", "run"]
+    assert main([*words, "--trust"]) == 0
+    assert main([*words, "--task", "my_robot:make"]) == 2
+    assert main([*words, "--task", "my_robot:make", "--method=mine:Mine"]) == 0
+
+
+def test_the_short_help_fits_a_screen_and_the_whole_has_every_field(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
+    shown = {}
+    for flag in ("--help", "--help-all"):
+        with pytest.raises(SystemExit) as ended:
+            main(["train", "--preset", "drawn", flag])
+        assert ended.value.code == 0
+        shown[flag] = capsys.readouterr().out
+    common = "task demos out preset method seed threads time-budget config resume print-config trust"
+    places = [shown["--help"].index(f"--{name} ") for name in common.split() if name != "threads"]
+    assert places == sorted(places)
+    assert "--threads INT" in shown["--help"] and "--agent.batch-size INT" not in shown["--help"]
+    assert "--help-all" in shown["--help"] and len(shown["--help"].splitlines()) < 60
+    for name in field_kinds():
+        if "." in name and not is_dataclass(field_kinds()[name]):
+            assert f"--{name.replace('_', '-')} " in shown["--help-all"]
+    assert "(default: drawn)" in shown["--help"]

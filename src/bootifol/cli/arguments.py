@@ -18,8 +18,9 @@ VideoPaths = Annotated[
     tyro.conf.Positional,
     tyro.conf.arg(metavar="VIDEO [VIDEO ...]", help_behavior_hint="(one or more)"),
 ]
-Trust = Annotated[
+Flag = Annotated[
     tyro.conf.UseCounterAction[int], tyro.conf.arg(metavar="", help_behavior_hint="(default: no)")
 ]
 """A flag without a value."""
+Trust = Flag
 DemosPath = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DEMOS")]

@@ -27,13 +27,16 @@ def join_lines(command: Callable[..., Any]) -> None:
 @functools.cache
 def _join_lines_of_fields(kind: type) -> None:
     """Writes what stands below each field, on one line, into the docstring of the class, where tyro looks first."""
-    described = {
-        field.arg_name: field.description or "" for field in docstring_parser.parse_from_object(kind).params
-    }
-    lines = [f"    {name}: {' '.join(text.split())}" for name, text in described.items()]
+    lines = [f"    {name}: {text}" for name, text in field_texts(kind).items()]
     kind.__doc__ = "\n".join([inspect.cleandoc(kind.__doc__ or ""), "", "Attributes:", *lines])
     for inner in _settings_of(kind):
         _join_lines_of_fields(inner)
+
+
+def field_texts(kind: type) -> dict[str, str]:
+    """What stands below each field of a dataclass, on one line."""
+    found = docstring_parser.parse_from_object(kind).params
+    return {field.arg_name: " ".join((field.description or "").split()) for field in found}
 
 
 def _settings_of(command: Callable[..., Any]) -> list[type]:

@@ -141,7 +141,7 @@ def _run(commands: dict[str, Callable[..., int]], words: list[str], prog: str, d
         commands,
         prog=prog,
         description=description,
-        args=words or ["--help"],
+        args=["--help" if word == "--help-all" else word for word in words] or ["--help"],
         config=(tyro.conf.FlagConversionOff, tyro.conf.AvoidSubcommands),
     )
     return code
@@ -159,9 +159,9 @@ def _command_of(words: list[str]) -> dict[str, Callable[..., int]]:
 def _imported(name: str, words: list[str]) -> Callable[..., int]:
     command: Callable[..., int] = getattr(import_module(COMMANDS[name][0]), name)
     if name == "train":
-        from bootifol.cli.train import preset_of
+        from bootifol.cli.train import command_of
 
-        return functools.partial(command, config=preset_of(words), words=tuple(words))
+        return command_of(words)
     return command
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
@@ -43,6 +44,7 @@ from bootifol.training.components import (
 )
 from bootifol.training.config import TrainingConfig
 from bootifol.training.interruption import Stopped
+from bootifol.training.overrides import overridden
 from bootifol.training.run_config import RunConfig, require_time_to_act
 from bootifol.training.run_directory import (
     require_resumable,
@@ -77,6 +79,7 @@ def train_policy(
     seed: int = 1,
     time_budget: float | None = None,
     config: TrainingConfig | None = None,
+    overrides: Mapping[str, Any] | None = None,
     command: Sequence[str] = (),
 ) -> TrainedRun:
     """Learns a reward from videos and trains a policy on it; writes the run's directory and its report.
@@ -89,10 +92,11 @@ def train_policy(
         out: directory of the run, new or empty.
         method: bootifol, virl, context_translation, gaifo, environment for the upper bound, or `module:name` for
             one of your own.
-        preset: paper, cpu, demo, drawn, smoke or backbone.
+        preset: paper, cpu, long, frames, backbone, drawn, drawn_pixels, demo or smoke.
         seed: of everything random.
         time_budget: seconds of wall-clock time for learning; None for the configuration's agent steps.
-        config: instead of the preset's.
+        config: instead of the preset's; `bootifol.preset(NAME)` returns one.
+        overrides: single fields of it, such as `{"agent.batch_size": 64}`; `bootifol train --help-all` lists them.
         command: what the user typed, for the report.
 
     Returns:
@@ -109,7 +113,7 @@ def train_policy(
         seed=seed,
         demos=str(demos),
         time_budget=time_budget,
-        training=config or preset_named(preset, method),
+        training=overridden(config or preset_named(preset, method), overrides or {}),
     )
     if time_budget is not None:
         require_time_to_act(run.training)

@@ -199,16 +199,17 @@ def from_json(kind: type[_Config], data: Any, path: Path) -> _Config:
 
 def _checked(value: Any, kind: Any, name: str, path: Path) -> Any:
     """A field's value as JSON has it, if it is of the field's type; dataclasses check the rest."""
-    if not _fits(value, kind):
+    if not fits(value, kind):
         raise BootifolError(
             f"{path} says that {name} is {shortened(value)}, which it cannot be: correct or restore the file"
         )
     return value
 
 
-def _fits(value: Any, kind: Any) -> bool:
+def fits(value: Any, kind: Any) -> bool:
+    """Whether a value as JSON and YAML have it is of a field's type."""
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
-        return any(_fits(value, choice) for choice in typing.get_args(kind))
+        return any(fits(value, choice) for choice in typing.get_args(kind))
     if typing.get_origin(kind) is typing.Literal:
         return isinstance(value, str | int) and value in typing.get_args(kind)
     if kind in (int, float):
