@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from bootifol.training.api import evaluate_run as evaluate
     from bootifol.training.api import score_videos as score
     from bootifol.training.api import train_policy as train
+    from bootifol.training.callbacks import Callback as Callback
+    from bootifol.training.callbacks import StopTraining as StopTraining
     from bootifol.training.policy_export import export_policy as export_policy
     from bootifol.training.saved_policy import load_policy as load_policy
 
@@ -40,6 +42,8 @@ _WHERE = {
     "export_videos": ("bootifol.demos.export_videos", "export_videos"),
     "import_videos": ("bootifol.demos.import_videos", "import_videos"),
     "record_demos": ("bootifol.demos.record", "record_demos"),
+    "Callback": ("bootifol.training.callbacks", "Callback"),
+    "StopTraining": ("bootifol.training.callbacks", "StopTraining"),
     "Policy": ("bootifol.agents.policy", "Policy"),
     "BootifolError": ("bootifol.errors", "BootifolError"),
     "preset": ("bootifol.presets", "preset"),
@@ -56,7 +60,9 @@ _WHERE = {
 
 __all__ = [
     "BootifolError",
+    "Callback",
     "Policy",
+    "StopTraining",
     "evaluate",
     "export_policy",
     "export_videos",

@@ -34,6 +34,7 @@ from bootifol.progress import progress
 from bootifol.reports.html import report
 from bootifol.rewards.references import draw_references
 from bootifol.rewards.registry import check_method
+from bootifol.training.callbacks import Callback
 from bootifol.training.checkpoint import load_checkpoint
 from bootifol.training.components import (
     build_backbone,
@@ -80,6 +81,7 @@ def train_policy(
     time_budget: float | None = None,
     config: TrainingConfig | None = None,
     overrides: Mapping[str, Any] | None = None,
+    callbacks: Sequence[Callback] = (),
     command: Sequence[str] = (),
 ) -> TrainedRun:
     """Learns a reward from videos and trains a policy on it; writes the run's directory and its report.
@@ -97,13 +99,15 @@ def train_policy(
         time_budget: seconds of wall-clock time for learning; None for the configuration's agent steps.
         config: instead of the preset's; `bootifol.preset(NAME)` returns one.
         overrides: single fields of it, such as `{"agent.batch_size": 64}`; `bootifol train --help-all` lists them.
+        callbacks: told what happens while it learns, and able to stop it: `bootifol.Callback` says when.
         command: what the user typed, for the report.
 
     Returns:
         The run's directory, and whether it came to its end.
 
     Raises:
-        BootifolError: bad input, or an error that the run can be resumed from, which its sentence says.
+        BootifolError: bad input, or an error that the run can be resumed from, which its sentence says; and whatever a
+            callback raises.
     """
     directory = Path(out)
     run = RunConfig(
@@ -119,18 +123,19 @@ def train_policy(
         require_time_to_act(run.training)
     with output_may_fail(), writing_run(directory):
         require_unused(directory)
-        learner = Run(run, directory, _console())
+        learner = Run(run, directory, _console(), callbacks)
         learner.begin_tracker()
         run.write(directory, list(command))
         return TrainedRun(directory, finished=_learn_and_report(learner))
 
 
-def continue_run(directory: AnyPath, trust: bool = False) -> bool:
+def continue_run(directory: AnyPath, trust: bool = False, callbacks: Sequence[Callback] = ()) -> bool:
     """Goes on with a run from its newest checkpoint, to its end, its final evaluation and its report.
 
     Args:
         directory: of the run.
         trust: whether code that its `config.json` names (a task or a method `MODULE:NAME`) may be imported.
+        callbacks: as of `train_policy`.
 
     Returns:
         False if it was asked to stop before its end.
@@ -143,7 +148,7 @@ def continue_run(directory: AnyPath, trust: bool = False) -> bool:
     run = _run_with_demos(directory, trust)
     with output_may_fail(), writing_run(directory):
         require_resumable(directory)
-        return _learn_and_report(Run(run, directory, _console()))
+        return _learn_and_report(Run(run, directory, _console(), callbacks))
 
 
 @dataclass(frozen=True)
@@ -283,12 +288,20 @@ def _run_with_demos(directory: AnyPath, trust: bool) -> RunConfig:
 
 
 def _learn_and_report(run: Run) -> bool:
+    finished = False
+    try:
+        finished = _learned_and_reported(run)
+    finally:
+        run.callbacks("on_end", finished)
+    return finished
+
+
+def _learned_and_reported(run: Run) -> bool:
     if not run.learn():
         return False
     try:
         run.finish()
     except Stopped:
-        run.log.close()
         run.console.print(f"stopped before its last measurements. {run.how_to_resume()}")
         return False
     target = report([run.directory], run.directory / "report.html")

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import shlex
 import time
+from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -27,6 +29,7 @@ from bootifol.rewards.registry import check_method
 from bootifol.tracking import Averages, RunLog, Tracker, cut_metrics, make_tracker, require_tracker
 from bootifol.training.alignment import alignment_phase
 from bootifol.training.budget import Budget, Counters, Stopwatch
+from bootifol.training.callbacks import Callback, Callbacks
 from bootifol.training.checkpoint import (
     Progress,
     load_checkpoint,
@@ -52,15 +55,19 @@ class Run:
         run: what it is.
         directory: where it writes; its newest checkpoint is gone on from, if there is one.
         console: where messages go.
+        callbacks: a user's code, which is told what happens.
 
     Raises:
         BootifolError: the configuration, the demos or the checkpoint cannot be used.
     """
 
-    def __init__(self, run: RunConfig, directory: Path, console: Console) -> None:
+    def __init__(
+        self, run: RunConfig, directory: Path, console: Console, callbacks: Sequence[Callback] = ()
+    ) -> None:
         self.run = run
         self.directory = directory
         self.console = console
+        self.callbacks = Callbacks(callbacks)
         config = self.run.training
         torch.set_num_threads(config.threads)
         keep_freed_memory()
@@ -81,6 +88,7 @@ class Run:
         self.interruption = Interruption()
         self._tracker: Tracker | None = None
         self._metrics_bytes = 0
+        self._ended = False
         checkpoint = self._resume()
         self.budget = Budget(
             config.interactive.agent_steps,
@@ -150,6 +158,7 @@ class Run:
         self.log = RunLog(self.directory, self._tracker)
         with self.interruption as interruption:
             try:
+                self._tell("on_start", self.directory)
                 if newest_checkpoint(self.directory / "checkpoints") is None:
                     self._checkpoint()
                 return self._align(interruption) and self._interact(interruption)
@@ -173,11 +182,17 @@ class Run:
         Raises:
             Stopped: it was asked to stop, and goes on with these measurements when it is resumed.
         """
+        self._ended = True
         with self.interruption:
-            self.demos.verification.wait()
-            returns = self.measurements.final_returns()
-            self.measurements.rank()
-            self.measurements.showcase()
+            try:
+                self.demos.verification.wait()
+                returns = self.measurements.final_returns()
+                self.callbacks("on_evaluation", self.counters.agent_steps, returns)
+                self.measurements.rank()
+                self.measurements.showcase()
+            except Exception:
+                self.log.close()
+                raise
         return returns
 
     def publish(self, page: Path) -> None:
@@ -273,6 +288,8 @@ class Run:
         if self.counters.to_evaluate:
             self.measurements.returns_on_the_way()
             self.counters.to_evaluate = 0
+            if self.measurements.newest:
+                self._tell("on_evaluation", self.counters.agent_steps, self.measurements.newest)
 
     def _interact(self, interruption: Interruption) -> bool:
         counters = self.counters
@@ -324,6 +341,14 @@ class Run:
 
     def _log(self, phase: str, count_name: str, count: int, metrics: Metrics) -> None:
         self.log.log(phase, count_name, count, self.counters.seconds, metrics)
+        self._tell("on_log", phase, count, metrics)
+
+    def _tell(self, event: str, *arguments: Any) -> None:
+        """Calls the callbacks; who raises `StopTraining` while the run learns has it stopped after this step."""
+        stop = self.callbacks(event, *arguments)
+        if stop is not None and not self._ended:
+            self.interruption.requested = True
+            self.console.print(f"a callback stops the run: {stop}".removesuffix(": "))
 
     def _shown(self) -> dict[str, float]:
         """What stands beside the progress bar."""
@@ -361,7 +386,7 @@ class Run:
 
     def _checkpoint(self) -> None:
         self._metrics_bytes = self.log.bytes_written()
-        save_checkpoint(
+        written = save_checkpoint(
             self.directory / "checkpoints",
             Progress(self.counters, dict(self.rng.bit_generator.state), self._metrics_bytes),
             {
@@ -373,6 +398,7 @@ class Run:
             self.directory, self.run, self.environment, self.components.agent, self.counters.agent_steps
         )
         self._saved_at = time.monotonic()
+        self._tell("on_checkpoint", written)
 
     def _checkpoint_unless(self, failed: BootifolError) -> None:
         """Writes a checkpoint of what was learned before an environment failed; if that fails, too, both are told."""
