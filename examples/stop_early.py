@@ -69,4 +69,4 @@ def learn(task: str, demos: str, run: str, patience: int = 10, **train: Any) -> 
 if __name__ == "__main__":
     if len(sys.argv) != 4:
         raise SystemExit(__doc__)
-    learn(*sys.argv[1:])
+    learn(sys.argv[1], sys.argv[2], sys.argv[3])

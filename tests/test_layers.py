@@ -29,6 +29,7 @@ SHARED = {
     "memory",
     "module_state",
     "own_modules",
+    "plugins",
 }
 """Modules without a place in the order: everyone may import them."""
 

@@ -1,4 +1,5 @@
-"""What users write in modules of their own and name as `MODULE:NAME`: environments and reward methods.
+"""What users write in modules of their own and name as `MODULE:NAME`: environments and reward methods; and what
+installed packages bring under a name (`plugins`).
 
 Such a name is code. One that a person typed is imported; one that stands in a file is not, unless a person allows it:
 the file may be a stranger's.
@@ -13,7 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bootifol.errors import BootifolError
+from bootifol.errors import BootifolError, shortened
+from bootifol.plugins import GROUPS, PluginKind, package_of, plugins
 
 _allowed: set[str] = set()
 """Names that were imported in this process already, so somebody typed or trusted them."""
@@ -26,8 +28,9 @@ def is_own_name(name: str) -> bool:
 
 
 def imports_code(name: str) -> bool:
-    """Whether Python imports a module to make what a task or a method names: MODULE:NAME, or gymnasium:PACKAGE:ID."""
-    return ":" in name.removeprefix("gymnasium:")
+    """Whether Python imports a module to make what a task or a method names: MODULE:NAME, gymnasium:PACKAGE:ID, or what
+    an installed package brings."""
+    return ":" in name.removeprefix("gymnasium:") or any(name in plugins(kind) for kind in GROUPS)
 
 
 def require_trust(path: Path, what: str, name: str, trust: bool) -> None:
@@ -54,16 +57,19 @@ def allow(name: str) -> None:
     _allowed.add(name)
 
 
-def own_callable(name: str, kind: str) -> Callable[..., Any]:
+def own_callable(name: str, kind: str, plugin: PluginKind | None = None) -> Callable[..., Any]:
     """Imports what a user's `MODULE:NAME` names; the module may lie in the current directory.
 
     Args:
-        name: for which `is_own_name` holds.
+        name: for which `is_own_name` holds, or that an installed package brings.
         kind: what it should be, for messages.
+        plugin: what packages may bring under a name; None where they bring nothing.
 
     Raises:
         BootifolError: there is no such module, it cannot be imported, or it has nothing callable of that name.
     """
+    if plugin is not None and not is_own_name(name):
+        return _of_a_package(name, kind, plugin)
     module_name, _, attribute = name.partition(":")
     if _is_of_python(module_name):
         raise BootifolError(
@@ -89,6 +95,29 @@ def own_callable(name: str, kind: str) -> Callable[..., Any]:
         own = [key for key, value in vars(module).items() if _is_own(value, module_name)]
         there = f"; it has {', '.join(own)}" if own else ""
         raise BootifolError(f"the module {module_name} has no {kind} {attribute}{there}")
+    made: Callable[..., Any] = found
+    return made
+
+
+def _of_a_package(name: str, kind: str, plugin: PluginKind) -> Callable[..., Any]:
+    entries = plugins(plugin)[name]
+    if len(entries) > 1:
+        raise BootifolError(
+            f"{' and '.join(map(package_of, entries))} both bring a {kind} {name}: write {entries[0].value} or "
+            f"{entries[1].value} for the one that you want"
+        )
+    (entry,) = entries
+    allow(name)
+    try:
+        found = entry.load()
+    except (Exception, SystemExit) as error:  # a package may do anything when it is imported
+        raise BootifolError(
+            f"the {kind} {name} of {package_of(entry)} cannot be imported: {told(error)}{where(error)}"
+        ) from error
+    if not callable(found):
+        raise BootifolError(
+            f"the {kind} {name} of {package_of(entry)} cannot be called: it is {shortened(found)}"
+        )
     made: Callable[..., Any] = found
     return made
 

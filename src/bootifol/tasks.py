@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from bootifol.envs.pictures import PictureConfig
 from bootifol.envs.pixels import PixelEnvironment, Simulator
 from bootifol.errors import LONGEST_EPISODE, BootifolError, require_at_least, require_at_most
+from bootifol.plugins import names_of_plugins, plugins
 
 if TYPE_CHECKING:
     from bootifol.envs.any_gymnasium import GymnasiumSimulator
@@ -190,7 +191,7 @@ def task_named(
     """Looks a task up, or makes one of a Gymnasium environment.
 
     Args:
-        name: from the catalogue, or `gymnasium:ID`, or `module:function`.
+        name: from the catalogue, or `gymnasium:ID`, or `module:function`, or what an installed package brings.
         action_repeat: instead of the task's own; episodes then last as long in simulator steps as before.
         episode_steps: instead of the task's own, in agent steps.
         evaluation_steps: instead of the task's own, in agent steps.
@@ -200,12 +201,12 @@ def task_named(
     """
     if name in TASKS:
         task = TASKS[name]
-    elif ":" in name:
+    elif ":" in name or name in plugins("task"):
         task = _gymnasium_task(name)
     else:
         raise BootifolError(
-            f"there is no task '{name}'; the tasks are {', '.join(TASKS)} (see `bootifol tasks`), and any Gymnasium "
-            "environment as gymnasium:ID or MODULE:FUNCTION"
+            f"there is no task '{name}'; the tasks are {', '.join(TASKS)}{names_of_plugins('task')} (see `bootifol "
+            "tasks`), and any Gymnasium environment as gymnasium:ID or MODULE:FUNCTION"
         )
     given = {
         "action_repeat": action_repeat,

@@ -83,7 +83,7 @@ def test_a_choice_that_is_none_is_refused(config: Any, field: dict[str, Any], se
 
 def test_the_command_line_offers_every_method() -> None:
     assert train.__doc__ is not None
-    (described,) = re.findall(r"method: (.*?)\n +preset:", train.__doc__, re.DOTALL)
+    (described,) = re.findall(r"method: (.*?)\n +seed:", train.__doc__, re.DOTALL)
     assert all(method in described for method in METHODS)
 
 

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from bootifol.errors import BootifolError
+from bootifol.plugins import GROUPS, package_of, plugins
 from bootifol.tasks import TASKS, Task, frames_per_second, short_name, task_named
 
 
@@ -26,7 +27,7 @@ def tasks(
     """List the tasks, the lengths of their episodes, and the returns of their expert and of random actions.
 
     Args:
-        names: Tasks to list. gymnasium:ID and MODULE:FUNCTION are tasks, too.
+        names: Tasks to list. gymnasium:ID, MODULE:FUNCTION and what installed packages bring are tasks, too.
         measure: Play this many evaluation episodes (seeds 0, 1, …) of each task's expert and of random actions, and
             print their mean return, standard deviation, 95% interval, and the share of episodes that succeeded at
             any step, where the environment says so.
@@ -60,6 +61,12 @@ def tasks(
             style="dim",
             highlight=False,
         )
+        for kind in GROUPS:
+            for name, entries in plugins(kind).items():
+                brought = " and ".join(map(package_of, entries))
+                console.print(
+                    f"--{kind} {name}: brought by {brought}", highlight=False, markup=False, soft_wrap=True
+                )
     if measure:
         console.print(_measured(listed, measure))
     for task in listed if names else []:

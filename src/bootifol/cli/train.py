@@ -16,6 +16,7 @@ import tyro
 from bootifol.cli.arguments import Flag, Trust
 from bootifol.cli.help_texts import field_texts
 from bootifol.errors import STOPPED, BootifolError
+from bootifol.own_modules import imports_code, require_trust
 from bootifol.presets import PresetName, preset
 from bootifol.tasks import short_name
 from bootifol.training.config import TrainingConfig
@@ -132,7 +133,8 @@ def train(
             stage, in under two minutes. paper: its hyperparameters. backbone: paper, with a pretrained EfficientNet-B0
             that reads videos of 224x224 pixels.
         method: bootifol, virl, context_translation and gaifo learn a reward from the videos; environment uses the true
-            reward, as an upper bound. MODULE:NAME is a method of your own (docs/add_a_method.md).
+            reward, as an upper bound. MODULE:NAME is a method of your own, and installed packages may bring others
+            (docs/add_a_method.md).
         seed: Of everything random.
         time_budget: Wall-clock time for learning, such as 90s, 45m or 1h30m; schedules are stretched to fit it.
             The final evaluation and the report come after it.
@@ -176,7 +178,7 @@ def train(
         name = task or "TASK"
         videos = (
             f"record videos with `bootifol demos record --task {name} --out demos/{name}`"
-            if ":" not in name
+            if ":" not in name and not imports_code(name)
             else f"import videos with `bootifol demos import YOUR_VIDEOS --out demos/{short_name(name)}`"
         )
         raise BootifolError(
@@ -206,8 +208,6 @@ def _require_trust_of_names(
     Raises:
         BootifolError: see there.
     """
-    from bootifol.own_modules import require_trust
-
     typed = flags_of(words)
     for what, name in names.items():
         if name is not None and f"--{what}" not in typed:
@@ -222,7 +222,6 @@ def _task_shown(demos: Path, trust: bool) -> str:
     """
     from bootifol.demos.demo_set import find_demo_sets
     from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
-    from bootifol.own_modules import require_trust
 
     tasks: set[str] = set()
     for directory in find_demo_sets(demos).values():

@@ -26,6 +26,7 @@ from bootifol.envs.other_answers import (
 from bootifol.envs.pictures import PictureConfig, centered_square, is_picture, told_kind
 from bootifol.errors import BootifolError, warn
 from bootifol.own_modules import allow, is_own_name, own_callable, told, where
+from bootifol.plugins import plugins
 from bootifol.types import Action, Frame
 
 PREFIX = "gymnasium:"
@@ -49,7 +50,7 @@ class GymnasiumSimulator:
     """Shows an environment's `render()` as square pictures; its observations are not used.
 
     Args:
-        name: `gymnasium:ID` or `module:function`.
+        name: `gymnasium:ID` or `module:function`, or the name of an installed package's task.
         pictures: size of the pictures; the render profile makes no difference.
 
     Raises:
@@ -257,12 +258,12 @@ def _registered(name: str) -> Environment:
 
 
 def _made_by_function(name: str) -> Environment:
-    if not is_own_name(name):
+    if not is_own_name(name) and name not in plugins("task"):
         raise BootifolError(
             f"'{name}' names no environment: write {PREFIX}ID, such as {PREFIX}Pendulum-v1, or MODULE:FUNCTION, "
             "such as my_package.my_module:make"
         )
-    function = own_callable(name, "function")
+    function = own_callable(name, "function", "task")
     try:
         made = function()
     except (Exception, SystemExit) as error:  # a function may do anything

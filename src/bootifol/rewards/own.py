@@ -1,4 +1,4 @@
-"""Reward methods in modules of their users, named `MODULE:NAME` (docs/add_a_method.md)."""
+"""Reward methods in modules of their users, named `MODULE:NAME`, and in installed packages (docs/add_a_method.md)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ MEMBERS = (
 
 
 def own_reward_model(name: str, video_size: int, seed: int, device: str) -> RewardModel:
-    """The reward model that `NAME(video_size, seed, device)` of a user's module returns.
+    """The reward model that `NAME(video_size, seed, device)` of a user's module, or of a package, returns.
 
     Args:
-        name: `MODULE:NAME`, a class or a function.
+        name: `MODULE:NAME`, a class or a function; or the name under which a package brings one.
         video_size: side of the videos in pixels.
         seed: of its parameters and draws.
         device: where to compute, as PyTorch names it.
@@ -29,7 +29,7 @@ def own_reward_model(name: str, video_size: int, seed: int, device: str) -> Rewa
         BootifolError: it cannot be imported, fails, lacks something that every reward model has, or reads the
             environment's reward.
     """
-    make = own_callable(name, "reward method")
+    make = own_callable(name, "reward method", "method")
     try:
         model = make(video_size, seed, device)
     except BootifolError:

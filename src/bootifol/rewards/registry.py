@@ -1,4 +1,4 @@
-"""The reward methods by name, and anyone's own as `MODULE:NAME` (docs/add_a_method.md).
+"""The reward methods by name, and anyone's own as `MODULE:NAME` or from an installed package (docs/add_a_method.md).
 
 To add one to the library: a folder beside this file, a field of `RewardConfig` and an entry of METHODS.
 """
@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from bootifol.errors import BootifolError
 from bootifol.networks.backbones import Backbone, load_backbone
 from bootifol.own_modules import is_own_name, own_callable
+from bootifol.plugins import names_of_plugins, plugins
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.frames.model import FrameRewardModel
@@ -104,18 +105,19 @@ def check_method(method: str) -> None:
     """Refuses a method that cannot be made, before anything is written; imports the module of one's own.
 
     Args:
-        method: a key of METHODS, or `MODULE:NAME`.
+        method: a key of METHODS, `MODULE:NAME`, or what an installed package brings.
 
     Raises:
         BootifolError: there is no such method, or its module cannot be imported.
     """
-    if is_own_name(method):
-        own_callable(method, "reward method")
-    elif method not in METHODS:
+    if method in METHODS:
+        return
+    if not is_own_name(method) and method not in plugins("method"):
         raise BootifolError(
-            f"there is no reward method {method!r}; choose one of {', '.join(METHODS)}, or write MODULE:NAME for one "
-            "of your own"
+            f"there is no reward method {method!r}; choose one of {', '.join(METHODS)}{names_of_plugins('method')}, or "
+            "write MODULE:NAME for one of your own"
         )
+    own_callable(method, "reward method", "method")
 
 
 def make_backbone(method: str, config: RewardConfig, video_size: int, device: str = "cpu") -> Backbone | None:
@@ -142,7 +144,8 @@ def make_reward_model(
     """The reward model of a method.
 
     Args:
-        method: a key of METHODS, or `MODULE:NAME`, which is called with (video_size, seed, device).
+        method: a key of METHODS, or `MODULE:NAME` or what an installed package brings, which are called with
+            (video_size, seed, device).
         config: of the methods in METHODS; one's own has its settings in its own module.
         video_size: side of the videos in pixels.
         seed: of its parameters and draws.

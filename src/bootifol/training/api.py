@@ -89,11 +89,11 @@ def train_policy(
     Ctrl-C and SIGTERM make it write a checkpoint and return early, which the result says.
 
     Args:
-        task: from the catalogue, or `gymnasium:ID`, or `module:function`.
+        task: from the catalogue, or `gymnasium:ID`, or `module:function`, or what an installed package brings.
         demos: directory of the videos.
         out: directory of the run, new or empty.
         method: bootifol, virl, context_translation, gaifo, environment for the upper bound, or `module:name` for
-            one of your own.
+            one of your own, or what an installed package brings.
         preset: paper, cpu, long, frames, backbone, drawn, drawn_pixels, demo or smoke.
         seed: of everything random.
         time_budget: seconds of wall-clock time for learning; None for the configuration's agent steps.
