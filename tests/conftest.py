@@ -52,3 +52,12 @@ def tiny_backbone(tmp_path_factory: pytest.TempPathFactory) -> str:
                 torch.nn.init.ones_(module.weight)
     model.save_pretrained(directory)
     return str(directory)
+
+
+@pytest.fixture
+def offline(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Weights & Biases writes its files and asks the network for nothing."""
+    monkeypatch.setenv("WANDB_MODE", "offline")
+    monkeypatch.setenv("WANDB_SILENT", "true")
+    for place in ("CONFIG", "CACHE", "DATA"):
+        monkeypatch.setenv(f"WANDB_{place}_DIR", str(tmp_path / "elsewhere"))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import wandb
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from bootifol import tracking
@@ -18,15 +19,6 @@ from bootifol.errors import BootifolError, BootifolWarning
 from bootifol.presets import SMOKE
 from bootifol.tracking import Averages, RunLog, TensorBoard, WeightsAndBiases, make_tracker
 from bootifol.training.api import train_policy
-
-
-@pytest.fixture
-def offline(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Weights & Biases writes its files and asks the network for nothing."""
-    monkeypatch.setenv("WANDB_MODE", "offline")
-    monkeypatch.setenv("WANDB_SILENT", "true")
-    for place in ("CONFIG", "CACHE", "DATA"):
-        monkeypatch.setenv(f"WANDB_{place}_DIR", str(tmp_path / "elsewhere"))
 
 
 def test_numbers_that_are_not_finite_are_null(tmp_path: Path) -> None:
@@ -80,7 +72,8 @@ def test_averages_are_of_the_steps_since_the_last_ones() -> None:
 
 
 def synced(run: Path) -> list[tuple[str, bytes]]:
-    """Of each session the id of its run of W&B, and what `wandb sync` would send."""
+    """Of each session the id of its run of W&B, and what `wandb sync` would send, once W&B's own process has ended."""
+    wandb.teardown()
     files = sorted(run.glob("wandb/offline-run-*/run-*.wandb"))
     return [(file.stem.removeprefix("run-"), file.read_bytes()) for file in files]
 
@@ -149,8 +142,6 @@ def test_wandb_that_is_chosen_and_not_installed_is_a_sentence_before_anything_is
 def test_wandb_that_cannot_begin_leaves_nothing(
     tmp_path: Path, offline: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import wandb
-
     def refuses(**_: object) -> None:
         raise wandb.errors.UsageError("No API key configured.")
 

@@ -200,6 +200,18 @@ def test_a_file_that_cannot_be_used_is_named(
     assert trainings.called is None
 
 
+def test_a_preset_that_would_change_nothing_is_refused(
+    tmp_path: Path, trainings: Trainings, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["train", "--preset", "smoke", "--print-config"]) == 0
+    whole = tmp_path / "whole.yaml"
+    whole.write_text(capsys.readouterr().out)
+    words = ["train", "--config", str(whole), "--task", "drawn_reach", "--demos", "demos", "--out", "run"]
+    assert main([*words, "--preset", "cpu"]) == 2
+    assert "says every field, so --preset cpu would change none" in capsys.readouterr().err
+    assert main([*words, "--preset", "smoke"]) == 0
+
+
 def test_code_that_a_file_names_may_be_typed_or_trusted(tmp_path: Path, trainings: Trainings) -> None:
     file = tmp_path / "run.yaml"
     file.write_text("task: my_robot:make\nmethod: mine:Mine\npreset: smoke")

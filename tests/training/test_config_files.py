@@ -83,6 +83,18 @@ def test_a_runs_configuration_trains_the_same_policy(tmp_path: Path, finished: P
     assert all((first[name] == second[name]).all() for name in first)
 
 
+def test_a_field_that_a_run_did_not_have_yet_is_what_it_is_for_who_resumes_it(tmp_path: Path) -> None:
+    """Not the preset's: that one has it on since."""
+    RunConfig("drawn_reach", "bootifol", "cpu", 1, "demos", None, PRESETS["cpu"]).write(tmp_path, [])
+    path = tmp_path / "config.json"
+    data = json.loads(path.read_text())
+    del data["config"]["agent"]["ema_decay"]
+    path.write_text(json.dumps(data))
+    again = read_config_file(path).configured(PRESETS["cpu"], str(path))
+    assert again == RunConfig.read(tmp_path).training
+    assert again.agent.ema_decay == 0.0 != PRESETS["cpu"].agent.ema_decay
+
+
 def test_a_file_of_before_trackers_is_read(tmp_path: Path) -> None:
     fields = asdict(ENDS_SOON) | {"tensorboard": True}
     del fields["tracker"]

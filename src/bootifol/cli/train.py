@@ -21,7 +21,6 @@ from bootifol.presets import PresetName, preset
 from bootifol.tasks import short_name
 from bootifol.training.config import TrainingConfig
 from bootifol.training.config_files import ConfigFile, config_text, read_config_file
-from bootifol.training.overrides import overridden
 
 ON_THE_FIRST_SCREEN = ("threads",)
 """Fields of a run that `--help` shows; `--help-all` shows every one."""
@@ -43,10 +42,17 @@ def command_of(words: Sequence[str]) -> Callable[..., int]:
     method = _value_of("--method", words, file.method or "bootifol")
     name = _value_of("--preset", words, file.preset or "cpu")
     try:
-        chosen = preset(name, method)
+        training = file.configured(preset(name, method), path)
     except BootifolError as error:
-        raise BootifolError(f"{path}: {error}") if name == file.preset else error from error
-    training = overridden(chosen, file.fields, path)
+        raise (
+            BootifolError(f"{path}: {error}") if name == file.preset and path not in str(error) else error
+        ) from error
+    if name != (said_by_file := file.preset or name) and training == file.configured(
+        preset(said_by_file, method), path
+    ):
+        raise BootifolError(
+            f"{path} says every field, so --preset {name} would change none: leave one of the two out"
+        )
     said: dict[str, Any] = {
         "task": file.task,
         "time_budget": file.time_budget,

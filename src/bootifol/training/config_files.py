@@ -16,7 +16,7 @@ from bootifol.errors import BootifolError, shortened
 from bootifol.files import parsed_json, require_file
 from bootifol.training.budget import parse_duration
 from bootifol.training.config import TrainingConfig
-from bootifol.training.overrides import field_kinds, nearest
+from bootifol.training.overrides import field_kinds, nearest, overridden
 from bootifol.training.run_config import FORMAT, fits, todays_fields
 
 LARGEST = 1_000_000
@@ -51,6 +51,16 @@ class ConfigFile:
     out: str | None = None
     fields: Mapping[str, Any] = field(default_factory=dict)
     """Of `TrainingConfig`, nested or dotted, for `overridden`, which checks them."""
+    of_a_run: bool = False
+    """Whether it is a run's `config.json`: a field that it lacks was not there when the run began."""
+
+    def configured(self, preset: TrainingConfig, where: str) -> TrainingConfig:
+        """The preset with the file's fields; of a run's file those alone, with defaults, as resuming reads it.
+
+        Raises:
+            BootifolError: a field cannot be what the file says.
+        """
+        return overridden(TrainingConfig() if self.of_a_run else preset, self.fields, where)
 
 
 def read_config_file(path: Path) -> ConfigFile:
@@ -63,7 +73,8 @@ def read_config_file(path: Path) -> ConfigFile:
         BootifolError: it cannot be read, or names something that there is not, or gives it a value it cannot have.
     """
     data = _parsed(path)
-    if data.get("format", FORMAT) != FORMAT:
+    of_a_run = "format" in data
+    if of_a_run and data["format"] != FORMAT:
         raise BootifolError(
             f"{path} is of format {shortened(data['format'])}, and this version reads {FORMAT}: use the version that "
             "wrote it"
@@ -89,7 +100,7 @@ def read_config_file(path: Path) -> ConfigFile:
             said[name] = value
     if "time_budget" in said:
         said["time_budget"] = _duration(said["time_budget"], path)
-    return ConfigFile(**said, fields=fields)
+    return ConfigFile(**said, fields=fields, of_a_run=of_a_run)
 
 
 def config_text(
