@@ -110,7 +110,7 @@ def test_an_interrupted_training_ends_with_130(trainings: Trainings, finished: b
 
 def test_what_was_typed_is_no_flag(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        main(["train", "--help"])
+        main(["train", "--help-all"])
     assert "--words" not in capsys.readouterr().out
 
 

@@ -240,7 +240,7 @@ def test_help_breaks_lines_where_the_terminal_ends_and_not_where_a_docstring_doe
     monkeypatch.setenv("COLUMNS", "120")  # one panel below the other
     for _ in range(2):  # what is joined once stays as it is
         with pytest.raises(SystemExit):
-            main(["train", "--help"])
+            main(["train", "--help-all"])
         printed = " ".join(capsys.readouterr().out.replace("│", " ").split())
         assert "cuda:NUMBER, or mps on a Mac. None but the CPU has been tried. (default: auto)" in printed
         assert "among those still in replay; 0 as in the paper, whose" in printed, "a setting of a setting"
