@@ -122,7 +122,7 @@ def test_doctor_names_missing_packages_and_how_to_install_them(
     monkeypatch.setattr(doctor_command.metadata, "version", without_av)
     assert main(["doctor"]) == 2
     captured = capsys.readouterr()
-    assert "pip install 'av>=17'" in captured.err
+    assert "pip install 'av>=18'" in captured.err
     assert any("av " in line and "missing" in line for line in captured.out.splitlines())
 
 
