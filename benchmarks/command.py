@@ -11,6 +11,9 @@ from bootifol.errors import STOPPED, BootifolError
 
 BAD_INPUT = 2
 
+PROGRAM = (sys.executable, "-m", "bootifol")
+"""What the words of a command of the library's are given to, where a benchmark wants a process of its own."""
+
 Words = ParamSpec("Words")
 
 

@@ -1,6 +1,6 @@
 """What does each method cost? Seconds per 1000 agent steps, peak memory, and parameters, each in a fresh process.
 
-    python -m benchmarks.cost --preset cpu --task reacher_hard --out results/reacher_hard/cost_cpu.csv
+    python -m benchmarks.cost benchmarks/suites/cpu.yaml --task reacher_hard --out results/reacher_hard/cost_cpu.csv
 
 Measured is the Interactive Phase with everything in it: acting, rendering, updates of agent and reward, rewarding
 each episode; and apart from it a gradient step of alignment, of which a run takes as many as the table says. The
@@ -28,24 +28,16 @@ from typing import NamedTuple
 import torch
 from rich.console import Console
 
-from benchmarks.command import command
+from benchmarks.command import PROGRAM, command
 from benchmarks.process_memory import status_bytes
 from benchmarks.resumable_table import ResumableTable
-from benchmarks.run_queue import PROGRAM, missing_demos, record_words
-from benchmarks.suites import (
-    RANDOM,
-    VIDEOS,
-    PlannedRun,
-    System,
-    every_system,
-    policy_input_ablation,
-)
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
-from bootifol.presets import PRESETS, preset
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.reports.markdown import markdown_table
+from bootifol.sweep.planned import RANDOM, PlannedRun, missing_videos, record_words
+from bootifol.sweep.sweep_file import read_sweep
 from bootifol.tasks import short_name
 from bootifol.training.alignment import alignment_phase
 from bootifol.training.cloning import cloning_phase
@@ -87,69 +79,69 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--task", default="reacher_hard")
-    parser.add_argument("--preset", default="cpu", choices=list(PRESETS))
+    parser.add_argument("sweep", type=Path, metavar="FILE.yaml", help="of `bootifol sweep`, with the systems")
+    parser.add_argument("--task", default="reacher_hard", help="of the file's")
     parser.add_argument(
         "--steps", type=int, default=300, help=f"agent steps of a block, {BLOCKS} of which are timed, twice"
     )
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--systems", nargs="+", help="by name; all by default")
+    parser.add_argument("--systems", nargs="+", help="by name; all that learn by default")
+    parser.add_argument("--out", type=Path, help="results/TASK/cost_FILE.csv")
     parser.add_argument(
-        "--demos", type=Path, default=Path("demos"), help="directory of the videos, one a task"
-    )
-    parser.add_argument("--out", type=Path, help="results/TASK/cost_PRESET.csv")
-    parser.add_argument("--measure", help=argparse.SUPPRESS)  # what the fresh process does
+        "--measure", type=Path, metavar="DEMOS", help=argparse.SUPPRESS
+    )  # in the fresh process
     arguments = parser.parse_args()
-    if arguments.measure is not None:
-        system = systems(arguments.preset, [arguments.measure], arguments.task)[0]
-        print(json.dumps(measured(arguments, system)))
-    else:
+    if arguments.measure is None:
         compare(arguments)
+    else:
+        (run,) = systems(arguments.sweep, arguments.task, arguments.threads, arguments.systems)
+        print(json.dumps(measured(replace(run, demos=arguments.measure), arguments.steps)))
 
 
-def systems(preset_name: str, names: Sequence[str] | None, task: str) -> list[System]:
-    """The systems of the paper's tables that learn, and the encoding-based agent, by name.
+def systems(sweep: Path, task: str, threads: int, names: Sequence[str] | None = None) -> list[PlannedRun]:
+    """A run of each system of a sweep that learns on a task.
 
     Args:
-        preset_name: of the suites that have them.
-        names: of those wanted; None for all that are compared on the task.
+        sweep: its file.
         task: its name.
+        threads: that each is measured with.
+        names: of the systems wanted, as METHOD or METHOD-VARIANT; None for all.
 
     Raises:
-        BootifolError: there is none of a name.
+        BootifolError: the file has none of a name on that task.
     """
     known = {
-        system.name: system
-        for list_systems in (every_system, policy_input_ablation)
-        for system in list_systems(preset(preset_name), timed=False)
-        if system.method != RANDOM
+        run.system: replace(run, cpus=threads)
+        for run in read_sweep(sweep)
+        if run.task == task and run.method != RANDOM
     }
     for name in names or ():
         if name not in known:
-            raise BootifolError(f"there is no system '{name}'; the systems are {', '.join(known)}")
-    return [known[name] for name in names or known if names or known[name].is_compared_on(task)]
+            raise BootifolError(f"there is no system '{name}' on {task}; the systems are {', '.join(known)}")
+    if not known:
+        raise BootifolError(f"{sweep} has no run on {task} that learns: name one of its tasks")
+    return [known[name] for name in names or known]
 
 
 def compare(arguments: argparse.Namespace) -> None:
     """Measures what is not in the table yet, one fresh process after another."""
     task = short_name(arguments.task)
-    out = arguments.out or Path("results") / task / f"cost_{arguments.preset}.csv"
+    out = arguments.out or Path("results") / task / f"cost_{arguments.sweep.stem}.csv"
     results = ResumableTable(out, tuple(COLUMNS), key=4)
     missing = [
-        system
-        for system in systems(arguments.preset, arguments.systems, arguments.task)
-        if not results.has(arguments.task, arguments.preset, system.name, arguments.threads)
+        run
+        for run in systems(arguments.sweep, arguments.task, arguments.threads, arguments.systems)
+        if not results.has(run.task, run.preset, run.system, run.cpus)
     ]
     with tempfile.TemporaryDirectory() as temporary:
-        for number, system in enumerate(missing, start=1):
-            print(f"measuring {system.name} ({number} of {len(missing)})", file=sys.stderr, flush=True)
-            demos = videos_of(planned(arguments, system), arguments.demos, Path(temporary))
-            words = ["--task", arguments.task, "--preset", arguments.preset, "--demos", str(demos)]
-            words += ["--steps", str(arguments.steps), "--threads", str(arguments.threads)]
-            command = [sys.executable, "-m", "benchmarks.cost", *words, "--measure", system.name]
+        for number, run in enumerate(missing, start=1):
+            print(f"measuring {run.system} ({number} of {len(missing)})", file=sys.stderr, flush=True)
+            words = [str(arguments.sweep), "--task", run.task, "--threads", str(run.cpus)]
+            words += ["--steps", str(arguments.steps), "--measure", str(videos_of(run, Path(temporary)))]
+            command = [sys.executable, "-m", "benchmarks.cost", *words, "--systems", run.system]
             finished = subprocess.run(command, stdout=subprocess.PIPE, text=True)
             if finished.returncode:
-                raise BootifolError(f"{system.name} could not be measured: its own message is above")
+                raise BootifolError(f"{run.system} could not be measured: its own message is above")
             results.add(json.loads(finished.stdout.splitlines()[-1]))
     table = markdown_table(list(COLUMNS.values()), [list(row.values()) for row in results.rows]) + "\n"
     with written_aside(out.with_suffix(".md")) as aside:
@@ -157,49 +149,48 @@ def compare(arguments: argparse.Namespace) -> None:
     print(table, end="")
 
 
-def planned(arguments: argparse.Namespace, system: System) -> PlannedRun:
-    """The run of a suite that is measured in part."""
-    return PlannedRun(arguments.task, system.preset or arguments.preset, system, seed=1)
-
-
-def videos_of(run: PlannedRun, demos: Path, spare: Path) -> Path:
+def videos_of(run: PlannedRun, spare: Path) -> Path:
     """Where a run's videos are; if nowhere, a few are recorded in `spare`: they cost as much to learn from as many.
 
     Raises:
         BootifolError: there are none, and none could be recorded.
     """
-    for place in (demos, spare):
-        if not missing_demos(place / run.demos_name):
-            return place / run.demos_name
-    directory = spare / run.demos_name
-    words = record_words(run.task, run.config, directory, FEW_VIDEOS, ("expert", "random"))
+    directory = spare / run.demos.name
+    for place in (run.demos, directory):
+        if not missing_videos(place):
+            return place
+    words = record_words(replace(run, demos=directory), ("expert", "random"), FEW_VIDEOS)
     if subprocess.run([*PROGRAM, *words]).returncode:
         raise BootifolError(f"there are no videos of {run.task} and none could be recorded: see above")
     return directory
 
 
-def measured(arguments: argparse.Namespace, system: System) -> dict[str, str]:
-    """A row of the table: one method in this process."""
-    of_suite = planned(arguments, system)
-    config = replace(of_suite.config, threads=arguments.threads)
+def measured(planned: PlannedRun, steps: int) -> dict[str, str]:
+    """A row of the table: one method in this process.
+
+    Args:
+        planned: what is measured in part.
+        steps: agent steps of a block.
+    """
+    config = planned.config
     with tempfile.TemporaryDirectory() as temporary:
         described = RunConfig(
-            arguments.task, system.method, of_suite.preset, 1, str(arguments.demos), None, shortened(config)
+            planned.task, planned.method, planned.preset, 1, str(planned.demos), None, shortened(config)
         )
         run = Run(described, Path(temporary), Console(quiet=True))
         alignment = prepare(run)
-        learning = seconds_per_1000(run, arguments.steps)
+        learning = seconds_per_1000(run, steps)
         resting = None
         if not run.components.reward_model.keeps_learning:
             run.interactive.config = replace(run.interactive.config, reward_updates_until=0)
-            resting = seconds_per_1000(run, arguments.steps)
+            resting = seconds_per_1000(run, steps)
         reward, agent = run.components.reward_model, run.components.agent
         return {
-            "task": arguments.task,
-            "preset": arguments.preset,
-            "system": system.name,
-            "threads": str(arguments.threads),
-            "agent_steps": str(BLOCKS * arguments.steps),
+            "task": planned.task,
+            "preset": planned.preset,
+            "system": planned.system,
+            "threads": str(planned.cpus),
+            "agent_steps": str(BLOCKS * steps),
             "alignment_steps": str(config.alignment.gradient_steps if alignment else 0),
             "seconds_alignment": f"{alignment:.2f}" if alignment else "",
             "seconds_learning": f"{learning.wall_clock:.1f}",
@@ -207,7 +198,7 @@ def measured(arguments: argparse.Namespace, system: System) -> dict[str, str]:
             "seconds_resting": f"{resting.wall_clock:.1f}" if resting else "",
             "cpu_seconds_resting": f"{resting.cpu:.1f}" if resting else "",
             "peak_memory_mb": f"{status_bytes('VmHWM') / 1e6:.0f}",
-            "stores_mb": f"{stores_when_full(config, run) / 1e6:.0f}",
+            "stores_mb": f"{stores_when_full(planned, run) / 1e6:.0f}",
             "reward_parameters": str(parameters([getattr(reward, "networks", None)])),
             "agent_parameters": str(parameters([agent.encoder, agent.actor, agent.critic])),
         }
@@ -280,8 +271,9 @@ def seconds_per_1000(run: Run, agent_steps: int) -> Seconds:
     return sorted(blocks)[BLOCKS // 2]
 
 
-def stores_when_full(config: TrainingConfig, run: Run) -> int:
-    """Bytes of the frames, or of their features, that a whole run of a suite keeps; a short one fills few of them."""
+def stores_when_full(planned: PlannedRun, run: Run) -> int:
+    """Bytes of the frames, or of their features, that a whole run of a sweep keeps; a short one fills few of them."""
+    config = planned.config
     size, frames = config.pictures.agent_size, run.task.episode_steps + 1
     action_dim = run.interactive.environment.action_space.shape or (0,)
     replay = ReplayBuffer.bytes_needed(config.agent.replay_capacity, size, action_dim[0])
@@ -294,7 +286,7 @@ def stores_when_full(config: TrainingConfig, run: Run) -> int:
     )
     demonstrated = 0
     if run.components.demonstrations is not None:
-        count = min(config.demonstrations.videos, VIDEOS[run.run.preset])
+        count = min(config.demonstrations.videos, planned.videos or config.demonstrations.videos)
         demonstrated = ReplayBuffer.bytes_needed(count * frames, size, action_dim[0])
     return replay + videos + demonstrated
 

@@ -39,10 +39,9 @@ import torch
 from rich.console import Console
 from scipy.stats import linregress
 
-from benchmarks.command import command
+from benchmarks.command import PROGRAM, command
 from benchmarks.paper_size_demos import MB
 from benchmarks.process_memory import status_bytes
-from benchmarks.run_queue import PROGRAM
 from bootifol.demos.agent_videos import AgentVideos
 from bootifol.errors import BootifolError, require_at_least
 from bootifol.memory import keep_freed_memory

@@ -1,9 +1,16 @@
-"""The Python files that a page of the documentation shows, so that what is tested and measured is what is read."""
+"""The Python files that a page of the documentation shows, so that what is tested and measured is what is read.
+
+python -m benchmarks.page_modules docs/add_a_method.md       # writes them into the current directory
+"""
 
 from __future__ import annotations
 
+import argparse
 import re
 from pathlib import Path
+
+from benchmarks.command import command
+from bootifol.errors import BootifolError
 
 _DOCS = Path(__file__).parents[1] / "docs"
 ADD_A_METHOD = _DOCS / "add_a_method.md"
@@ -26,3 +33,21 @@ def write_page_modules(page: Path, directory: Path) -> list[Path]:
         files.append(directory / name)
         files[-1].write_text(code)
     return files
+
+
+@command()
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("page", type=Path, help="in Markdown")
+    parser.add_argument("--out", type=Path, default=Path(), help="directory to write to (the current one)")
+    arguments = parser.parse_args()
+    if not arguments.page.is_file():
+        raise BootifolError(f"there is no page {arguments.page}; name one such as {ADD_A_METHOD}")
+    for file in write_page_modules(arguments.page, arguments.out):
+        print(file)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -9,7 +9,7 @@ from bootifol.tasks import make_environment
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The slow tests first: begun last, they would keep one worker busy while the other has nothing left to do."""
-    items.sort(key=lambda item: "end_to_end" not in item.path.parts)
+    items.sort(key=lambda item: "end_to_end" not in item.path.parts and item.path.name != "test_sweep.py")
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ that goes from one to the other passes `to_device` or `to_host`. On a CPU both a
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -77,3 +78,10 @@ def to_floats(values: Sequence[float | Tensor]) -> list[float]:
     scalars = [value.detach().float() for value in values if isinstance(value, Tensor)]
     fetched = iter(to_host(torch.stack(scalars)).tolist() if scalars else [])
     return [next(fetched) if isinstance(value, Tensor) else value for value in values]
+
+
+def usable_cores() -> int:
+    """Cores that this process may use, where the system says so; else those of the machine."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

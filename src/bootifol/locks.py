@@ -15,12 +15,13 @@ NAME = ".lock"
 
 
 @contextmanager
-def one_writer(directory: Path, lock: Path | None = None) -> Iterator[None]:
+def one_writer(directory: Path, lock: Path | None = None, wait: float = 0.0) -> Iterator[None]:
     """Keeps other processes from writing into a directory; makes it, and removes it where nothing came into it.
 
     Args:
         directory: what is written.
         lock: the lock's file, by default in the directory.
+        wait: seconds to wait for another process to end.
 
     Raises:
         BootifolError: another process writes there, or this one may not.
@@ -30,7 +31,7 @@ def one_writer(directory: Path, lock: Path | None = None) -> Iterator[None]:
     try:
         made = [path for path in (file.parent, *file.parent.parents) if not path.exists()]
         file.parent.mkdir(parents=True, exist_ok=True)
-        held = FileLock(file, timeout=0)
+        held = FileLock(file, timeout=wait)
         held.acquire()
     except Timeout:
         raise BootifolError(

@@ -5,22 +5,22 @@ from __future__ import annotations
 import json
 import subprocess
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import torch
-from benchmarks.suites import SMALL, PlannedRun, System, backbone_comparison
 
 from benchmarks import cost
 from bootifol.errors import BootifolError
-from bootifol.presets import CPU
 
+SUITES = Path(__file__).parents[2] / "benchmarks" / "suites"
 ROW = dict.fromkeys(cost.COLUMNS, "1")
 
 
 def test_a_row_counts_parameters_and_memory(demos: Path) -> None:
-    arguments = Namespace(task="drawn_home", preset="smoke", threads=1, steps=1, demos=demos)
-    row = cost.measured(arguments, System("environment", overrides=SMALL))
+    (run,) = cost.systems(SUITES / "smoke.yaml", "drawn_home", 1, ["environment"])
+    row = cost.measured(replace(run, demos=demos), steps=1)
     assert list(row) == list(cost.COLUMNS)
     assert row["reward_parameters"] == "0" and int(row["agent_parameters"]) > 0
     assert float(row["seconds_learning"]) > 0 and int(row["peak_memory_mb"]) > 0
@@ -45,16 +45,12 @@ def test_only_what_is_missing_is_measured(
         return subprocess.CompletedProcess(command, code, stdout=f"a line\n{json.dumps(row)}\n")
 
     monkeypatch.setattr(subprocess, "run", run)
-    (tmp_path / "demos").mkdir()
-    (tmp_path / "demos" / "drawn_home").symlink_to(demos)
+    sweep = tmp_path / "mine.yaml"
+    sweep.write_text(
+        f"tasks: drawn_home\nmethods: [gaifo, virl, random, environment]\npresets: smoke\ndemos: {demos}\n"
+    )
     arguments = Namespace(
-        task="drawn_home",
-        preset="smoke",
-        systems=["gaifo", "virl", "environment"],
-        demos=tmp_path / "demos",
-        steps=1,
-        threads=1,
-        out=tmp_path / "cost.csv",
+        sweep=sweep, task="drawn_home", systems=None, steps=1, threads=1, out=tmp_path / "cost.csv"
     )
     with pytest.raises(BootifolError, match="virl could not be measured"):
         cost.compare(arguments)
@@ -66,27 +62,25 @@ def test_only_what_is_missing_is_measured(
     assert table[0].startswith("| task | preset | system | threads |") and len(table) == 2 + 4
 
 
-def test_an_unknown_system_is_named() -> None:
-    assert "random" not in [system.name for system in cost.systems("cpu", None, "reacher_hard")]
-    with pytest.raises(BootifolError, match="there is no system 'magic'; the systems are bootifol,"):
-        cost.systems("cpu", ["magic"], "reacher_hard")
+def test_an_unknown_system_or_task_is_named() -> None:
+    with pytest.raises(BootifolError, match="no system 'magic' on reacher_hard; the systems are bootifol,"):
+        cost.systems(SUITES / "cpu.yaml", "reacher_hard", 1, ["magic"])
+    with pytest.raises(BootifolError, match="has no run on drawn_reach that learns"):
+        cost.systems(SUITES / "cpu.yaml", "drawn_reach", 1)
 
 
-def test_the_backbone_is_measured_where_the_paper_has_it_or_when_asked_for() -> None:
+def test_the_backbone_is_measured_where_the_paper_has_it() -> None:
     measured = {
-        task: [system.name for system in cost.systems("cpu", None, task)]
+        task: {run.system for run in cost.systems(SUITES / "cpu.yaml", task, 1)}
         for task in ("reacher_hard", "drawer_close")
     }
-    assert [*measured["reacher_hard"][:2], "bootifol-backbone"] == measured["drawer_close"][:3]
-    assert [system.name for system in cost.systems("cpu", ["bootifol-backbone"], "reacher_hard")] == [
-        "bootifol-backbone"
-    ]
+    assert measured["drawer_close"] - measured["reacher_hard"] == {"bootifol-backbone"}
+    assert "random" not in measured["reacher_hard"]
 
 
 def test_videos_of_another_size_are_recorded_apart(
     tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "drawn_home").symlink_to(demos)
     recorded: list[list[str]] = []
 
     def record_nothing(command: list[str]) -> subprocess.CompletedProcess[str]:
@@ -94,8 +88,9 @@ def test_videos_of_another_size_are_recorded_apart(
         return subprocess.CompletedProcess(command, 0)
 
     monkeypatch.setattr(subprocess, "run", record_nothing)
-    small, large = (PlannedRun("drawn_home", "cpu", system, 1) for system in backbone_comparison(CPU, False))
-    assert cost.videos_of(small, tmp_path, tmp_path / "spare") == tmp_path / "drawn_home"
+    small, large = cost.systems(SUITES / "backbone.yaml", "drawer_close", 1)
+    assert cost.videos_of(replace(small, demos=demos), tmp_path) == demos
     assert not recorded
-    assert cost.videos_of(large, tmp_path, tmp_path / "spare") == tmp_path / "spare" / "drawn_home-224"
+    large = replace(large, demos=tmp_path / "none" / "drawer_close-224")
+    assert cost.videos_of(large, tmp_path / "spare") == tmp_path / "spare" / "drawer_close-224"
     assert recorded[0][recorded[0].index("--video-size") + 1] == "224"

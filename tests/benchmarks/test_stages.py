@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 from benchmarks.stages import measure, stages_of, warm_up
-from benchmarks.suites import SMALL, with_overrides
 from rich.console import Console
 
-from bootifol.presets import SMOKE
+from bootifol.sweep.sweep_file import read_sweep
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 
-CONFIG = with_overrides(SMOKE, (*SMALL, ("interactive.reward_updates_until", 160)))
+SMALL = read_sweep(Path(__file__).parents[2] / "benchmarks" / "suites" / "smoke.yaml")[0].config
+CONFIG = replace(SMALL, interactive=replace(SMALL.interactive, reward_updates_until=160))
 
 
 def counts(demos: Path, directory: Path, method: str, config: TrainingConfig) -> dict[str, float]:

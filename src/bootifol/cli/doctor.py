@@ -63,6 +63,8 @@ def doctor() -> int:
         table.add_row(what, measured)
     console.print(table)
 
+    from bootifol.devices import usable_cores
+
     table = Table(
         "--threads",
         "ms an update of the agent",
@@ -70,7 +72,7 @@ def doctor() -> int:
         title="Learning with the preset cpu",
         title_justify="left",
     )
-    by_threads = milliseconds_by_threads(thread_counts(_cores()))
+    by_threads = milliseconds_by_threads(thread_counts(usable_cores()))
     for threads, (update, reward_step) in by_threads.items():
         table.add_row(str(threads), f"{update:.0f}", f"{reward_step:.0f}")
     console.print(table)
@@ -133,9 +135,9 @@ def machine() -> list[tuple[str, str]]:
     """Rows about cores, memory and arithmetic."""
     import torch
 
-    from bootifol.devices import chosen_device
+    from bootifol.devices import chosen_device, usable_cores
 
-    rows = [("cores", f"{_cores()} ({torch.get_num_threads()} used by PyTorch)")]
+    rows = [("cores", f"{usable_cores()} ({torch.get_num_threads()} used by PyTorch)")]
     memory = _memory_bytes()
     if memory is not None:
         rows.append(("memory", f"{memory / 2**30:.1f} GB"))
@@ -247,13 +249,6 @@ def _seconds(work: Callable[[], object], repetitions: int = 5) -> float:
         work()
         times.append(time.perf_counter() - started)
     return min(times)
-
-
-def _cores() -> int:
-    """Those this process may use, where the system says so."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _memory_bytes() -> int | None:

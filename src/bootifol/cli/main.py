@@ -52,6 +52,10 @@ COMMANDS = {
         "bootifol.cli.train",
         "Learn a reward from videos and train a policy on it, or go on with an interrupted run.",
     ),
+    "sweep": (
+        "bootifol.cli.sweep",
+        "Train tasks, methods, variants and seeds that a file names, on this machine's cores or on a Ray cluster.",
+    ),
     "evaluate": (
         "bootifol.cli.evaluate",
         "Play episodes with the newest policy of one run or several, without exploration, and print their returns.",

@@ -138,7 +138,7 @@ def _parsed(path: Path) -> dict[str, Any]:
         if path.stat().st_size > LARGEST:
             raise ValueError(f"it has {path.stat().st_size:,} bytes, more than any configuration")
         text = path.read_text(encoding="utf-8")
-        data = parsed_json(text) if path.suffix == ".json" else yaml.load(text, _Loader)
+        data = parsed_json(text) if path.suffix == ".json" else yaml.load(text, YamlLoader)
     except FileNotFoundError:
         raise BootifolError(f"the configuration is missing: there is no {path}") from None
     except RecursionError:
@@ -152,7 +152,7 @@ def _parsed(path: Path) -> dict[str, Any]:
     return data
 
 
-class _Loader(yaml.SafeLoader):  # type: ignore[misc]
+class YamlLoader(yaml.SafeLoader):  # type: ignore[misc]
     """YAML that makes nothing but texts, numbers, lists and mappings, and in which 1e-4 is a number."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
@@ -171,7 +171,7 @@ class _Loader(yaml.SafeLoader):  # type: ignore[misc]
         return made
 
 
-_Loader.add_implicit_resolver(
+YamlLoader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(r"[-+]?[0-9][0-9_]*(?:\.[0-9_]*)?[eE][-+]?[0-9]+$"),
     list("-+0123456789"),

@@ -96,8 +96,14 @@ def _collect(overrides: Mapping[str, Any], before: str, values: dict[str, Any], 
             _collect(value, f"{name}.", values, where)
         elif not fits(value, kind):
             raise BootifolError(f"{where}: {name} cannot be {shortened(value)}; it is {_in_words(kind)}")
-        elif values.setdefault(name, value) != value:
+        elif values.setdefault(name, _as_kind(value, kind)) != value:
             raise BootifolError(f"{where}: {name} is named twice, with two values: leave one out")
+
+
+def _as_kind(value: Any, kind: Any) -> Any:
+    """1 as 1.0 where a field has fractions, so that it is written down as the command line's is."""
+    kinds = typing.get_args(kind) or (kind,)
+    return float(value) if type(value) is int and float in kinds and int not in kinds else value
 
 
 def _in_words(kind: Any) -> str:

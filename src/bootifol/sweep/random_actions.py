@@ -1,6 +1,6 @@
 """Random actions, evaluated and written down like a run: the lower end of the scale in tables and figures.
 
-    python -m benchmarks.random_policy --task reacher_hard --demos demos/reacher_hard --out runs/random
+    python -m bootifol.sweep.random_actions --task reacher_hard --demos demos/reacher_hard --out runs/random
 
 It takes the words of `bootifol train`; nothing is learned, so there are no checkpoints and no curves.
 """
@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import functools
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-from benchmarks.command import command
 from bootifol.cli.train import preset_of
 from bootifol.envs.rollout import Act
+from bootifol.errors import BootifolError
 from bootifol.evaluation.returns import EpisodeResult, evaluate, evaluation_rows, evaluation_seeds
 from bootifol.evaluation.tables import append_evaluations
 from bootifol.experts import make_random
@@ -32,16 +33,16 @@ def play(
     task: str,
     demos: Path,
     out: Path,
-    method: str = "random",
     preset: str = "cpu",
     seed: int = 1,
     time_budget: str | None = None,
+    words: Annotated[tuple[str, ...], tyro.conf.Fixed, tyro.conf.Suppress] = (),
 ) -> None:
-    """Plays the final evaluation of a run with random actions; `method` and `time_budget` change nothing."""
+    """Plays the final evaluation of a run with random actions; `time_budget` changes nothing."""
     run = RunConfig(task, "random", preset, seed, str(demos), None, config)
     resolved = run.resolved_task()
     environment = build_environment(run, resolved.evaluation_steps)
-    run.write(out, ["python", "-m", "benchmarks.random_policy", *sys.argv[1:]])
+    run.write(out, ["python", "-m", "bootifol.sweep.random_actions", *words])
     act: Act = make_random(environment, seed)
     results: list[EpisodeResult] = []
     with progress("random actions", config.evaluation.final_episodes) as advance:
@@ -61,15 +62,23 @@ def play(
     report([out], out / "report.html")
 
 
-@command()
-def main() -> None:
-    words = sys.argv[1:]
-    tyro.cli(
-        functools.partial(play, config=preset_of(words)),
-        args=words,
-        config=(tyro.conf.FlagConversionOff, tyro.conf.AvoidSubcommands),
-    )
+def main(words: Sequence[str]) -> int:
+    """The command.
+
+    Returns:
+        0, or 2 after bad input, which one sentence explains.
+    """
+    try:
+        tyro.cli(
+            functools.partial(play, config=preset_of([*words, "--method", "random"]), words=tuple(words)),
+            args=words,
+            config=(tyro.conf.FlagConversionOff, tyro.conf.AvoidSubcommands),
+        )
+    except BootifolError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(main(sys.argv[1:]))
