@@ -28,7 +28,7 @@ from bootifol.training.checkpoint import newest_checkpoint
 
 ray = pytest.importorskip("ray", reason="sweeps run on Ray (the extra sweep)")
 
-LONG = "    interactive.agent_steps: 300\n    agent.replay_capacity: 400\n    checkpoint_minutes: 0.02\n"
+LONG = "    interactive.agent_steps: 600\n    agent.replay_capacity: 400\n    checkpoint_minutes: 0.002\n"
 """Long enough to be interrupted, with checkpoints on the way."""
 PATIENCE = 240
 """Seconds after which a test that waits gives up."""
@@ -282,4 +282,4 @@ def test_a_run_whose_machine_dies_goes_on_elsewhere_from_its_last_checkpoint(
     assert int(resumed.split(" and ")[1].split()[0]) > 0, "not from its beginning"
     lines = [json.loads(line) for line in (directory / "metrics.jsonl").read_text().splitlines()]
     steps = [line["agent_steps"] for line in lines if "agent/q" in line]
-    assert steps == sorted(set(steps)) and steps[-1] == 300, "nothing stands there twice"
+    assert steps == sorted(set(steps)) and steps[-1] == 600, "nothing stands there twice"

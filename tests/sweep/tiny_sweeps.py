@@ -54,8 +54,10 @@ tracker: none
 
 
 def tiny_sweep(path: Path, demos: Path, methods: str, more: str = "") -> Path:
-    """Writes the file of a sweep of tiny runs; `more` are more fields of theirs, and more keys where not indented."""
-    fields = "".join(f"    {line}\n" for line in TINY.strip().splitlines())
+    """Writes the file of a sweep of tiny runs; `more` are other fields of theirs, and more keys where not indented."""
+    fields = "".join(
+        f"    {line}\n" for line in TINY.strip().splitlines() if f"{line.partition(':')[0]}:" not in more
+    )
     path.write_text(
         f"tasks: drawn_home\nmethods: {methods}\npresets: smoke\ndemos: {demos}\nvariants:\n  default:\n{fields}{more}"
     )
