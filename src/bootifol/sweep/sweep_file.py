@@ -52,8 +52,8 @@ class Grid:
     presets: tuple[str, ...] = ("cpu",)
     """Where there are several, their names are part of the variants'."""
     variants: Mapping[str, Overrides] = field(default_factory=lambda: {DEFAULT: ()})
-    """By name, what they change of the preset: dotted fields, as `train --help-all` lists them, and their values. The runs
-    of the one that is called `default` are named by their method alone."""
+    """By name, what they change of the preset: dotted fields, as `train --help-all` lists them, and their values. The
+    runs of the one that is called `default` are named by their method alone."""
     seeds: tuple[int, ...] = (1,)
     demos: str = "demos/{task}"
     """Directory of the demo sets; {task} is the task's name."""
