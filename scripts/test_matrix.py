@@ -78,7 +78,6 @@ def try_out(wheel: Path, python: str, versions: str, simulators: bool, torch_ind
         demos, trained = ("demos", "run")
         task = "reacher_hard" if simulators else "drawn_home"
         record = ["demos", "record", "--task", task, "--episodes", EPISODES, "--out", demos]
-        record += ["--agent-size", "32", "--video-size", "32"]
         train = ["train", "--task", task, "--preset", "smoke", "--demos", demos, "--out", trained]
         try:
             run([interpreter, "-m", "venv", Path(directory) / "environment"])
