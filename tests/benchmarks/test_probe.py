@@ -7,6 +7,7 @@ import torch
 from benchmarks.probe import read, watched, with_fields
 
 from bootifol.errors import BootifolError
+from bootifol.presets import preset
 from bootifol.rewards.bootifol.frames.config import FrameConfig
 
 
@@ -31,7 +32,7 @@ def test_fields_of_the_eyes_are_numbers() -> None:
 
 @pytest.mark.parametrize(("task", "named"), [("reacher_hard", "to_target[0]"), ("plate_slide", "object[0]")])
 def test_frames_go_with_what_the_simulator_shows(task: str, named: str) -> None:
-    frames, truth, names = watched(task, 30)
+    frames, truth, names = watched(task, 30, preset("frames").pictures)
     assert frames.shape == (30, 64, 64, 3)
     assert truth.shape == (30, len(names))
     assert named in names
@@ -40,4 +41,4 @@ def test_frames_go_with_what_the_simulator_shows(task: str, named: str) -> None:
 
 def test_a_task_without_an_observation_is_a_sentence() -> None:
     with pytest.raises(BootifolError, match="DeepMind Control and Meta-World"):
-        watched("drawn_reach", 5)
+        watched("drawn_reach", 5, preset("frames").pictures)

@@ -1,12 +1,23 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 from benchmarks.table_rewards import main, share_of_the_way
-from fake_program import write_config, write_end
 
 from bootifol.evaluation.tables import RankingRow, append_ranking
+
+
+def write_run(run: Path, seed: int) -> None:
+    """The configuration and the end of a run that is done."""
+    run.mkdir()
+    header = {"task": "drawn_home", "method": "bootifol", "seed": seed, "time_budget": None}
+    config = {"interactive": {"agent_steps": 240}, "evaluation": {"final_episodes": 1}}
+    (run / "config.json").write_text(json.dumps(header | {"config": config}))
+    (run / "metrics.jsonl").write_text('{"phase": "interactive", "agent_steps": 240, "seconds": 9.0}\n')
+    columns = "agent_steps,seconds,episode_steps,episode,seed,environment_return,scaled_return,success"
+    (run / "evaluations.csv").write_text(f"{columns}\n240,9.0,60,0,7,50.0,1.0,True\n")
 
 
 def ranked(agent_steps: int, **rewards: tuple[float, ...]) -> list[RankingRow]:
@@ -31,9 +42,7 @@ def test_a_row_tells_the_ranking_before_acting_and_at_the_end(
     at_chance = ranked(240, random=(0.0, 3.0), half_good=(1.0, 2.0), expert=(0.5, 6.0), agent=(4.125,))
     for seed, rows in ((1, [*perfect, *at_chance]), (2, at_chance)):
         run = tmp_path / f"seed{seed}"
-        run.mkdir()
-        write_config(run, {"task": "drawn_home", "method": "bootifol", "seed": seed})
-        write_end(run, 9.0)
+        write_run(run, seed)
         append_ranking(run / "ranking.csv", rows)
     assert main([str(tmp_path)]) == 0
     row = capsys.readouterr().out.splitlines()[2]

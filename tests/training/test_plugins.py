@@ -82,6 +82,8 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (site / "brought_tasks.py").write_text(TASKS)
     monkeypatch.syspath_prepend(site)
     monkeypatch.setattr(own_modules, "_allowed", set())
+    for module in ("optimal_transport", "brought_tasks", "variants"):  # of another test
+        monkeypatch.delitem(sys.modules, module, raising=False)
     yield site
     for module in ("optimal_transport", "brought_tasks", "variants"):
         sys.modules.pop(module, None)

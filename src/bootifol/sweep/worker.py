@@ -11,6 +11,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -75,6 +76,7 @@ def work_on(
     Raises:
         Killed: so that Ray repeats the task, which then goes on with the run.
     """
+    _hear_cancellation()
     try:
         os.chdir(surroundings.home)
         if recording:
@@ -100,6 +102,16 @@ def work_on(
         return Ending(error=_unlike(surroundings, error))
 
 
+def _hear_cancellation() -> None:
+    """Ray cancels a task by an interrupt, which nobody hears in what a shell began in the background: there SIGINT is
+    ignored."""
+    if (
+        signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        and threading.current_thread() is threading.main_thread()
+    ):
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def _failed(directory: Path, error: str) -> Ending:
     note_failure(directory, error)
     return Ending(error=error)
@@ -116,6 +128,7 @@ def record(words: Sequence[str], log: Path, surroundings: Surroundings) -> str:
     Returns:
         The sentence of what went wrong, or nothing.
     """
+    _hear_cancellation()
     try:
         os.chdir(surroundings.home)
         attempt = _Attempt(words, log, surroundings)
