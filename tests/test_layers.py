@@ -11,7 +11,18 @@ import bootifol
 
 PACKAGE = Path(bootifol.__file__).parent
 
-LAYERS = ["envs", "experts", "demos", "networks", "rewards", "replay", "agents", "evaluation", "reports"]
+LAYERS = [
+    "video_files",
+    "envs",
+    "experts",
+    "demos",
+    "networks",
+    "rewards",
+    "replay",
+    "agents",
+    "evaluation",
+    "reports",
+]
 """From the videos to the report; a layer may import those before it."""
 
 SHARED = {
@@ -23,11 +34,10 @@ SHARED = {
     "files",
     "hub",
     "devices",
-    "gradient_step",
     "progress",
     "tasks",
-    "memory",
-    "module_state",
+    "malloc",
+    "optim",
     "own_modules",
     "plugins",
 }

@@ -14,11 +14,11 @@ import wandb
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from bootifol import tracking
-from bootifol.demos.video_writing import write_video
 from bootifol.errors import BootifolError, BootifolWarning
 from bootifol.presets import SMOKE
 from bootifol.tracking import Averages, RunLog, TensorBoard, WeightsAndBiases, make_tracker
 from bootifol.training.api import train_policy
+from bootifol.video_files.writing import write_video
 
 
 def test_numbers_that_are_not_finite_are_null(tmp_path: Path) -> None:

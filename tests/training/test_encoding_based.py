@@ -16,7 +16,7 @@ from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.registry import RewardConfig
 from bootifol.training.api import evaluate_run
-from bootifol.training.components import build_agent, build_reward_model
+from bootifol.training.build import build_agent, build_reward_model
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 from bootifol.types import Action, Video

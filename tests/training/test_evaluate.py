@@ -7,11 +7,11 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tests.demos.whole_videos import read_video
+from tests.video_files.whole_videos import read_video
 
 from bootifol.cli.main import main
-from bootifol.demos.video_files import frame_rate
 from bootifol.training.api import evaluate_run
+from bootifol.video_files.reading import frame_rate
 
 
 @pytest.fixture(autouse=True)

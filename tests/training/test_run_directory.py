@@ -21,7 +21,7 @@ from bootifol.errors import BootifolError
 from bootifol.files import read_json
 from bootifol.locks import one_writer
 from bootifol.tracking import RunLog, TensorBoard, cut_metrics
-from bootifol.training import components
+from bootifol.training import build
 from bootifol.training.api import continue_run, train_policy
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.interactive import InteractivePhase
@@ -184,7 +184,7 @@ def test_large_sets_are_verified_while_the_run_learns(
     tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own = Path(shutil.copytree(demos, tmp_path / "demos"))
-    monkeypatch.setattr(components, "_VERIFY_BELOW_BYTES", 0)
+    monkeypatch.setattr(build, "_VERIFY_BELOW_BYTES", 0)
     shard = own / "random" / "shard-00000.npy"
     flipped = bytearray(shard.read_bytes())
     flipped[-1] ^= 1

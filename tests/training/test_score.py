@@ -12,10 +12,10 @@ from tiny_runs import PICTURES, TINY, new_run
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.demos.record import record
-from bootifol.demos.video_writing import write_video
 from bootifol.errors import BootifolError
 from bootifol.training.api import read_videos, score_videos
 from bootifol.training.run_config import RunConfig
+from bootifol.video_files.writing import write_video
 
 SHORT = replace(TINY, interactive=replace(TINY.interactive, agent_steps=30))
 

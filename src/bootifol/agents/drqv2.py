@@ -28,9 +28,8 @@ from bootifol.agents.networks import (
 )
 from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
-from bootifol.gradient_step import take_step
-from bootifol.module_state import load_module_state, module_state
 from bootifol.networks.eyes import Eyes
+from bootifol.optim import load_module_state, module_state, take_step
 from bootifol.types import Action, Arrays, Batch, Observation, StepMetrics
 
 AnyEncoder = Encoder | EncodingEncoder | StateEncoder

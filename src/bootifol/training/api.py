@@ -14,7 +14,6 @@ from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.demos.import_videos import LARGEST_SQUARE, read_recordings
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
 from bootifol.demos.match_set import match_of
-from bootifol.demos.video_writing import write_video
 from bootifol.envs.rollout import PlayedEpisode
 from bootifol.errors import (
     LARGEST_COUNT,
@@ -34,15 +33,15 @@ from bootifol.progress import progress
 from bootifol.reports.html import report
 from bootifol.rewards.references import draw_references
 from bootifol.rewards.registry import check_method
-from bootifol.training.callbacks import Callback
-from bootifol.training.checkpoint import load_checkpoint
-from bootifol.training.components import (
+from bootifol.training.build import (
     build_backbone,
     build_environment,
     build_reward_model,
     open_demos,
     reference_rng,
 )
+from bootifol.training.callbacks import Callback
+from bootifol.training.checkpoint import load_checkpoint
 from bootifol.training.config import TrainingConfig
 from bootifol.training.interruption import Stopped
 from bootifol.training.overrides import overridden
@@ -56,6 +55,7 @@ from bootifol.training.run_directory import (
 from bootifol.training.saved_policy import require_checkpoint, restored_agent
 from bootifol.training.train import Run
 from bootifol.types import AnyPath, Rewards, Video
+from bootifol.video_files.writing import write_video
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ import gymnasium
 import numpy as np
 
 from bootifol.agents.drqv2 import DrQv2
-from bootifol.demos.agent_videos import AgentVideos
 from bootifol.demos.augmentation import AugmentationConfig, augmented
 from bootifol.envs.rollout import Act, EpisodeRecorder, rollout
+from bootifol.replay.agent_videos import AgentVideos
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import Featurizer, RewardModel, SeesFrames
 from bootifol.rewards.references import draw_references
@@ -25,7 +25,7 @@ from bootifol.tracking import Averages
 from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.cloning import cloning_due
 from bootifol.training.config import InteractiveConfig
-from bootifol.training.demonstrations import Demonstrations
+from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.types import Action, Arrays, Batch, Observation, VideoSource
 
 
