@@ -43,7 +43,7 @@ SHARED = {
 }
 """Modules without a place in the order: everyone may import them."""
 
-ABOVE = {"training", "sweep", "cli", "presets", "tracking"}
+ABOVE = {"training", "api", "sweep", "cli", "presets", "tracking"}
 """What sees all layers; no layer may import it."""
 
 

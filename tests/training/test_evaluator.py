@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from tiny_runs import ENDS_SOON, new_run
 
+from bootifol import api
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.evaluation.returns import evaluation_seeds
 from bootifol.evaluation.tables import read_evaluations
 from bootifol.tracking import RunLog
-from bootifol.training.api import evaluate_run
 from bootifol.training.interactive import episode_seed
 from bootifol.types import Action, Observation
 
@@ -58,7 +58,7 @@ def test_what_is_measured_is_played_without_noise(
         run.evaluator.returns_on_the_way,
         run.evaluator.final_returns,
         run.evaluator.sample_episodes,
-        lambda: evaluate_run(finished, episodes=1),
+        lambda: api.evaluate(finished, episodes=1),
     ):
         explored.clear()
         measure()

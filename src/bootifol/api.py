@@ -60,17 +60,17 @@ from bootifol.video_files.writing import write_video
 
 @dataclass(frozen=True)
 class TrainedRun:
-    """What `train_policy` leaves. It stands for its directory wherever a path does."""
+    """What `train` leaves. It stands for its directory wherever a path does."""
 
     directory: Path
     finished: bool
-    """False if it was asked to stop before its end: `continue_run` goes on."""
+    """False if it was asked to stop before its end: `resume` goes on."""
 
     def __fspath__(self) -> str:
         return str(self.directory)
 
 
-def train_policy(
+def train(
     task: str,
     demos: AnyPath,
     out: AnyPath,
@@ -129,13 +129,13 @@ def train_policy(
         return TrainedRun(directory, finished=_learn_and_report(learner))
 
 
-def continue_run(directory: AnyPath, trust: bool = False, callbacks: Sequence[Callback] = ()) -> bool:
+def resume(directory: AnyPath, trust: bool = False, callbacks: Sequence[Callback] = ()) -> bool:
     """Goes on with a run from its newest checkpoint, to its end, its final evaluation and its report.
 
     Args:
         directory: of the run.
         trust: whether code that its `config.json` names (a task or a method `MODULE:NAME`) may be imported.
-        callbacks: as of `train_policy`.
+        callbacks: as of `train`.
 
     Returns:
         False if it was asked to stop before its end.
@@ -171,7 +171,7 @@ class RunEvaluation:
         return sum(told) if told else None
 
 
-def evaluate_run(
+def evaluate(
     directory: AnyPath,
     episodes: int = 10,
     seed: int = 1000,
@@ -224,7 +224,7 @@ def evaluate_run(
     return RunEvaluation(results, summary, scaled_return(summary.mean, **levels), task.evaluation_steps, rows)
 
 
-def score_videos(directory: AnyPath, videos: Sequence[AnyPath], trust: bool = False) -> dict[str, Rewards]:
+def score(directory: AnyPath, videos: Sequence[AnyPath], trust: bool = False) -> dict[str, Rewards]:
     """The learned reward along videos, each compared with the same expert videos where the method compares.
 
     Args:
@@ -266,7 +266,7 @@ def scored_videos(
 
 
 def write_scores(path: Path, scores: dict[str, Rewards]) -> None:
-    """Writes `score_videos`' result as CSV with the columns video, step, reward."""
+    """Writes `score`' result as CSV with the columns video, step, reward."""
     with written_aside(path) as aside, aside.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["video", "step", "reward"])
