@@ -31,6 +31,16 @@ def test_the_newest_come_in_order_of_age(count: int) -> None:
     assert [video.name for video in filled(4, count).newest(9)] == names[-4:]
 
 
+@pytest.mark.parametrize("count", [3, 4, 9])
+def test_the_slot_of_a_video_is_known_by_its_age(count: int) -> None:
+    ring = filled(4, count)
+    names = [ring[ring.slot_of(age)].name for age in range(len(ring))]
+    assert names == [f"agent-{count - 1 - age}" for age in range(min(count, 4))]
+    for age in (-1, len(ring)):
+        with pytest.raises(IndexError):
+            ring.slot_of(age)
+
+
 def test_a_short_episode_stands_still_on_its_last_frame() -> None:
     ring = AgentVideos(2, FRAMES, SIZE)
     frames = moving_videos(2)

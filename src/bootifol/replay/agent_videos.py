@@ -110,7 +110,17 @@ class AgentVideos:
     def newest(self, count: int) -> list[Video]:
         """The newest `count` videos, or all if there are fewer; oldest first."""
         count = min(count, len(self))
-        return [self[(self._next - count + offset) % len(self._frames)] for offset in range(count)]
+        return [self[self.slot_of(age)] for age in reversed(range(count))]
+
+    def slot_of(self, age: int) -> int:
+        """The slot of a video that so many others are newer than, 0 for the newest.
+
+        Raises:
+            IndexError: there are not as many videos.
+        """
+        if not 0 <= age < len(self):
+            raise IndexError(f"the {age}th newest of {len(self)} videos, counted from 0")
+        return (self._next - 1 - age) % len(self._frames)
 
     def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
         return self._frames[self._drawn(count, rng)]

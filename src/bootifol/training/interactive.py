@@ -239,7 +239,7 @@ class InteractivePhase:
         ids = self.replay.episode_ids
         kept = range(max(ids.start, ids.stop - len(self.agent_videos)), ids.stop)
         episode_id = int(self.rng.integers(kept.start, kept.stop))
-        slot = episode_id % self.config.agent_videos
+        slot = self.agent_videos.slot_of(age=ids.stop - 1 - episode_id)
         video = self.agent_videos[slot]
         references = draw_references(self.reward_model, self.expert, self.rng)
         # An episode that ended early stands still in the ring up to the full length; no reward looks ahead at that.
