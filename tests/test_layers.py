@@ -38,7 +38,6 @@ SHARED = {
     "tasks",
     "malloc",
     "optim",
-    "own_modules",
     "plugins",
 }
 """Modules without a place in the order: everyone may import them."""

@@ -16,7 +16,7 @@ import tyro
 from bootifol.cli.arguments import Flag, Trust
 from bootifol.cli.help_texts import field_texts
 from bootifol.errors import STOPPED, BootifolError
-from bootifol.own_modules import imports_code, require_trust
+from bootifol.plugins import imports_code, require_trust
 from bootifol.presets import PresetName, preset
 from bootifol.tasks import short_name
 from bootifol.training.config import TrainingConfig

@@ -23,7 +23,7 @@ from bootifol.devices import chosen_device
 from bootifol.errors import BootifolError, EnvironmentFailed
 from bootifol.evaluation.tables import drop_later_rows
 from bootifol.malloc import keep_freed_memory
-from bootifol.own_modules import imports_code
+from bootifol.plugins import imports_code
 from bootifol.progress import progress
 from bootifol.rewards.registry import check_method
 from bootifol.tracking import Averages, RunLog, Tracker, cut_metrics, make_tracker, require_tracker

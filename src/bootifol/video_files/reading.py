@@ -67,7 +67,7 @@ def video_paths(paths: Sequence[Path]) -> list[Path]:
 
 
 def is_lerobot_dataset(path: Path) -> bool:
-    """Whether a directory is laid out as a LeRobot dataset; `demos.lerobot` reads those."""
+    """Whether a directory is laid out as a LeRobot dataset; `lerobot_reading` reads those."""
     return (path / "meta" / "info.json").is_file()
 
 
