@@ -28,7 +28,7 @@ from bootifol.envs.rollout import play_episode
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import KINDS, rank_videos, ranking_scores
 from bootifol.files import written_aside
-from bootifol.memory import keep_freed_memory
+from bootifol.malloc import keep_freed_memory
 from bootifol.presets import preset
 from bootifol.progress import progress
 from bootifol.rewards.bootifol.config import BootifolConfig

@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 
 from benchmarks.command import command
 from bootifol.cli.main import main as bootifol
-from bootifol.demos.video_writing import write_video
 from bootifol.envs.any_gymnasium import GymnasiumSimulator
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import STOPPED
 from bootifol.progress import progress
+from bootifol.video_files.writing import write_video
 
 Controller = Callable[[Any], NDArray[np.float64]]
 """The expert's action, in the environment's own units, from the environment itself."""

@@ -34,7 +34,7 @@ from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.demos.record import HALF_GOOD_VIDEOS
 from bootifol.errors import require_at_least
 from bootifol.evaluation.ranking import KINDS, area_under_curve
-from bootifol.memory import keep_freed_memory
+from bootifol.malloc import keep_freed_memory
 from bootifol.reports.markdown import markdown_table
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.references import draw_references

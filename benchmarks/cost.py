@@ -31,9 +31,9 @@ from rich.console import Console
 from benchmarks.command import PROGRAM, command
 from benchmarks.process_memory import status_bytes
 from benchmarks.resumable_table import ResumableTable
-from bootifol.demos.agent_videos import AgentVideos
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
+from bootifol.replay.agent_videos import AgentVideos
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.reports.markdown import markdown_table
 from bootifol.sweep.planned import RANDOM, PlannedRun, missing_videos, record_words

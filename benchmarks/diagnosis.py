@@ -33,7 +33,7 @@ from bootifol.files import written_aside
 from bootifol.progress import progress
 from bootifol.reports.style import house_style
 from bootifol.rewards.references import draw_references
-from bootifol.training.components import build_environment
+from bootifol.training.build import build_environment
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 from bootifol.types import Rewards, Video

@@ -31,7 +31,7 @@ from benchmarks.plain.bootifol import PlainBootifol
 from benchmarks.plain.drqv2 import PlainDrQv2, PlainReplay
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.envs.pictures import RenderProfile
-from bootifol.memory import keep_freed_memory
+from bootifol.malloc import keep_freed_memory
 from bootifol.presets import CPU, PAPER
 from bootifol.progress import progress
 from bootifol.replay.buffer import ReplayBuffer

@@ -2,9 +2,9 @@
 
     python -m benchmarks.fuzz_import --minutes 10
 
-Whole files of the awkward corpus (`tests/demos/awkward_files.py`) are damaged at random: bytes changed, a piece cut
-off, taken out, repeated or copied in from another file. A worker process reads each and is watched from outside, for a
-crash takes its process along and a hang never returns. Exit code 1 on a crash, a hang, another exception than a
+Whole files of the awkward corpus (`tests/video_files/awkward_files.py`) are damaged at random: bytes changed, a piece
+cut off, taken out, repeated or copied in from another file. A worker process reads each and is watched from outside:
+a crash takes its process along and a hang never returns. Exit code 1 on a crash, a hang, another exception than a
 refusal, or a cut file read as if it were whole; the files that did it are kept in --keep. "Read otherwise": another
 number of frames than before the damage, which may have changed what the file says of itself. "Told": the same, of a
 file that does not say how long it is, with a warning that its end may be missing.
@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tests.demos.awkward_files import make_all
+from tests.video_files.awkward_files import make_all
 
 from benchmarks.command import command
 from bootifol.reports.markdown import markdown_table
@@ -79,8 +79,8 @@ def read_files(orders: Connection) -> None:
     """The worker: reads one file after another and answers with what came of it and the number of frames."""
     import av
 
-    from bootifol.demos.video_files import stream_video
     from bootifol.errors import BootifolError, collected_warnings
+    from bootifol.video_files.reading import stream_video
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this process
     av.logging.set_level(None)

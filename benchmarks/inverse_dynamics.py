@@ -22,8 +22,8 @@ from bootifol.errors import BootifolError
 from bootifol.evaluation.returns import evaluation_seeds
 from bootifol.experts import make_expert
 from bootifol.progress import progress
-from bootifol.training.components import build_environment
-from bootifol.training.demonstrations import moving_steps
+from bootifol.training.build import build_environment
+from bootifol.training.inferred_demonstrations import moving_steps
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 

@@ -42,14 +42,14 @@ from scipy.stats import linregress
 from benchmarks.command import PROGRAM, command
 from benchmarks.paper_size_demos import MB
 from benchmarks.process_memory import status_bytes
-from bootifol.demos.agent_videos import AgentVideos
 from bootifol.errors import BootifolError, require_at_least
-from bootifol.memory import keep_freed_memory
+from bootifol.malloc import keep_freed_memory
 from bootifol.presets import PRESETS, preset
+from bootifol.replay.agent_videos import AgentVideos
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.reports.markdown import markdown_table
 from bootifol.training.budget import Budget, Counters
-from bootifol.training.components import Components, build_components, build_environment, build_learners
+from bootifol.training.build import Components, build_components, build_environment, build_learners
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.run_config import RunConfig
 from bootifol.types import Episode, FrameBatch, Video

@@ -46,7 +46,7 @@ from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.manifest import Manifest, Shard, VideoEntry, write_manifest
 from bootifol.demos.shards import sha256_of_frames, videos_per_shard, write_shard
 from bootifol.errors import BootifolError, require_at_least
-from bootifol.memory import keep_freed_memory
+from bootifol.malloc import keep_freed_memory
 from bootifol.networks.frame_encoders import picture_sizes
 from bootifol.presets import PRESETS, preset
 from bootifol.progress import progress

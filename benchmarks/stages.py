@@ -122,7 +122,7 @@ def stages_of(run: Run) -> Iterator[Stage]:
     yield Stage(
         "evaluation on the way",
         evaluations,
-        run.measurements.returns_on_the_way,
+        run.evaluator.returns_on_the_way,
         computes=False,
         slow=True,
     )

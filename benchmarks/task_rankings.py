@@ -41,7 +41,7 @@ from bootifol.evaluation.ranking import (
 )
 from bootifol.evaluation.tables import RankingRow
 from bootifol.experts.behaviors import Behavior
-from bootifol.memory import keep_freed_memory
+from bootifol.malloc import keep_freed_memory
 from bootifol.presets import preset
 from bootifol.progress import progress
 from bootifol.reports.markdown import markdown_table

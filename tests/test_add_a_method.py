@@ -22,8 +22,8 @@ from bootifol.files import read_arrays
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.references import draw_references
 from bootifol.rewards.registry import RewardConfig, check_method, make_reward_model
+from bootifol.training.build import build_reward_model
 from bootifol.training.checkpoint import newest_checkpoint
-from bootifol.training.components import build_reward_model
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.run_config import RunConfig
 from bootifol.types import Video

@@ -17,12 +17,12 @@ from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.policy import PolicyConfig, read_policy, write_policy
 from bootifol.cli.main import main
 from bootifol.demos.import_videos import Conversion
-from bootifol.demos.lerobot_export import write_lerobot
 from bootifol.demos.manifest import read_manifest
-from bootifol.demos.video_writing import write_video
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.hub import HubAddress, hub_address, is_hub_address
+from bootifol.video_files.lerobot_writing import write_lerobot
+from bootifol.video_files.writing import write_video
 
 huggingface_hub = pytest.importorskip("huggingface_hub")
 errors = pytest.importorskip("huggingface_hub.errors")

@@ -11,7 +11,18 @@ import bootifol
 
 PACKAGE = Path(bootifol.__file__).parent
 
-LAYERS = ["envs", "experts", "demos", "networks", "rewards", "replay", "agents", "evaluation", "reports"]
+LAYERS = [
+    "video_files",
+    "envs",
+    "experts",
+    "demos",
+    "networks",
+    "rewards",
+    "replay",
+    "agents",
+    "evaluation",
+    "reports",
+]
 """From the videos to the report; a layer may import those before it."""
 
 SHARED = {
@@ -23,17 +34,15 @@ SHARED = {
     "files",
     "hub",
     "devices",
-    "gradient_step",
     "progress",
     "tasks",
-    "memory",
-    "module_state",
-    "own_modules",
+    "malloc",
+    "optim",
     "plugins",
 }
 """Modules without a place in the order: everyone may import them."""
 
-ABOVE = {"training", "sweep", "cli", "presets", "tracking"}
+ABOVE = {"training", "api", "sweep", "cli", "presets", "tracking"}
 """What sees all layers; no layer may import it."""
 
 

@@ -14,8 +14,8 @@ import pytest
 from bootifol.agents.config import DrQv2Config
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.policy import Policy, PolicyConfig, write_policy
-from bootifol.demos.video_writing import write_video
 from bootifol.envs.pictures import PictureConfig
+from bootifol.video_files.writing import write_video
 
 pytest.importorskip("cv2")
 

@@ -13,12 +13,11 @@ import pytest
 import wandb
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from bootifol import tracking
-from bootifol.demos.video_writing import write_video
+from bootifol import api, tracking
 from bootifol.errors import BootifolError, BootifolWarning
 from bootifol.presets import SMOKE
 from bootifol.tracking import Averages, RunLog, TensorBoard, WeightsAndBiases, make_tracker
-from bootifol.training.api import train_policy
+from bootifol.video_files.writing import write_video
 
 
 def test_numbers_that_are_not_finite_are_null(tmp_path: Path) -> None:
@@ -135,7 +134,7 @@ def test_wandb_that_is_chosen_and_not_installed_is_a_sentence_before_anything_is
 ) -> None:
     monkeypatch.setattr(tracking, "find_spec", lambda name: found)
     with pytest.raises(BootifolError, match=r"pip install 'bootifol\[wandb\]'"):
-        train_policy("drawn_home", tmp_path, tmp_path / "run", config=replace(SMOKE, tracker="wandb"))
+        api.train("drawn_home", tmp_path, tmp_path / "run", config=replace(SMOKE, tracker="wandb"))
     assert not (tmp_path / "run").exists()
 
 

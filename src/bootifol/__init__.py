@@ -20,6 +20,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bootifol.agents.policy import Policy as Policy
+    from bootifol.api import evaluate as evaluate
+    from bootifol.api import resume as resume
+    from bootifol.api import score as score
+    from bootifol.api import train as train
     from bootifol.demos.export_videos import export_videos as export_videos
     from bootifol.demos.import_videos import import_videos as import_videos
     from bootifol.demos.record import record_demos as record_demos
@@ -27,10 +31,6 @@ if TYPE_CHECKING:
     from bootifol.presets import preset as preset
     from bootifol.reports.html import report as report
     from bootifol.reports.table_files import table as table
-    from bootifol.training.api import continue_run as resume
-    from bootifol.training.api import evaluate_run as evaluate
-    from bootifol.training.api import score_videos as score
-    from bootifol.training.api import train_policy as train
     from bootifol.training.callbacks import Callback as Callback
     from bootifol.training.callbacks import StopTraining as StopTraining
     from bootifol.training.policy_export import export_policy as export_policy
@@ -38,48 +38,30 @@ if TYPE_CHECKING:
 
 __version__ = version("bootifol")
 
-_WHERE = {
-    "export_videos": ("bootifol.demos.export_videos", "export_videos"),
-    "import_videos": ("bootifol.demos.import_videos", "import_videos"),
-    "record_demos": ("bootifol.demos.record", "record_demos"),
-    "Callback": ("bootifol.training.callbacks", "Callback"),
-    "StopTraining": ("bootifol.training.callbacks", "StopTraining"),
-    "Policy": ("bootifol.agents.policy", "Policy"),
-    "BootifolError": ("bootifol.errors", "BootifolError"),
-    "preset": ("bootifol.presets", "preset"),
-    "report": ("bootifol.reports.html", "report"),
-    "table": ("bootifol.reports.table_files", "table"),
-    "resume": ("bootifol.training.api", "continue_run"),
-    "evaluate": ("bootifol.training.api", "evaluate_run"),
-    "score": ("bootifol.training.api", "score_videos"),
-    "train": ("bootifol.training.api", "train_policy"),
-    "export_policy": ("bootifol.training.policy_export", "export_policy"),
-    "load_policy": ("bootifol.training.saved_policy", "load_policy"),
+_MODULES = {
+    "BootifolError": "errors",
+    "Callback": "training.callbacks",
+    "Policy": "agents.policy",
+    "StopTraining": "training.callbacks",
+    "evaluate": "api",
+    "export_policy": "training.policy_export",
+    "export_videos": "demos.export_videos",
+    "import_videos": "demos.import_videos",
+    "load_policy": "training.saved_policy",
+    "preset": "presets",
+    "record_demos": "demos.record",
+    "report": "reports.html",
+    "resume": "api",
+    "score": "api",
+    "table": "reports.table_files",
+    "train": "api",
 }
-"""Module and name of each public function, imported when first used: `bootifol --help` must not wait for PyTorch."""
+"""Where each public name is, imported when first used: `bootifol --help` must not wait for PyTorch."""
 
-__all__ = [
-    "BootifolError",
-    "Callback",
-    "Policy",
-    "StopTraining",
-    "evaluate",
-    "export_policy",
-    "export_videos",
-    "import_videos",
-    "load_policy",
-    "preset",
-    "record_demos",
-    "report",
-    "resume",
-    "score",
-    "table",
-    "train",
-]
+__all__ = list(_MODULES)
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _WHERE:
+    if name not in _MODULES:
         raise AttributeError(f"module 'bootifol' has no attribute '{name}'")
-    module, attribute = _WHERE[name]
-    return getattr(import_module(module), attribute)
+    return getattr(import_module(f"bootifol.{_MODULES[name]}"), name)

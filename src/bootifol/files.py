@@ -7,6 +7,7 @@ import math
 import os
 import re
 import shutil
+import tokenize
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -20,6 +21,9 @@ from safetensors.numpy import load_file, save_file
 from bootifol.checksums import BLANK, NAME, require_as_written, seal
 from bootifol.errors import BootifolError
 from bootifol.types import Arrays
+
+DAMAGED_ARRAY = (ValueError, OSError, EOFError, SyntaxError, tokenize.TokenError, MemoryError, TypeError)
+"""What numpy raises at a file that is no array of its own, or a damaged one: it reads headers as Python literals."""
 
 _LARGEST_JSON = 1 << 28
 """Bytes of a JSON file above which it is none of ours; the largest, of a set of a million videos, has half of that."""

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from bootifol.errors import BootifolError
-from bootifol.own_modules import told
+from bootifol.plugins import told
 
 # One slash where `Path` has been at it.
 _ADDRESS = re.compile(

@@ -21,7 +21,7 @@ from bootifol.training.config import (
     InteractiveConfig,
     TrainingConfig,
 )
-from bootifol.training.demonstrations import DemonstrationConfig
+from bootifol.training.inferred_demonstrations import DemonstrationConfig
 
 PresetName = Literal[
     "paper",

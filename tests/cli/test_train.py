@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bootifol import api
 from bootifol.cli.main import main
 from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.presets import CPU, SMOKE
-from bootifol.training import api
-from bootifol.training.api import TrainedRun
 from bootifol.training.overrides import field_kinds
 
 EIGHT = PictureConfig(agent_size=8, video_size=8)
@@ -28,11 +27,11 @@ class Trainings:
     finished: bool = True
     called: dict[str, Any] | None = None
 
-    def train_policy(self, task: str, demos: Path, out: Path, **named: Any) -> TrainedRun:
+    def train(self, task: str, demos: Path, out: Path, **named: Any) -> api.TrainedRun:
         self.called = {"task": task, "demos": demos, "out": out, **named}
-        return TrainedRun(out, self.finished)
+        return api.TrainedRun(out, self.finished)
 
-    def continue_run(self, directory: Path) -> bool:
+    def resume(self, directory: Path) -> bool:
         self.called = {"resumed": directory}
         return self.finished
 
@@ -40,8 +39,8 @@ class Trainings:
 @pytest.fixture
 def trainings(monkeypatch: pytest.MonkeyPatch) -> Trainings:
     trainings = Trainings()
-    monkeypatch.setattr(api, "train_policy", trainings.train_policy)
-    monkeypatch.setattr(api, "continue_run", trainings.continue_run)
+    monkeypatch.setattr(api, "train", trainings.train)
+    monkeypatch.setattr(api, "resume", trainings.resume)
     return trainings
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bootifol.demos.agent_videos import AgentVideos
 from bootifol.demos.augmentation import AugmentationConfig, augment, augmented
 from bootifol.errors import BootifolError
+from bootifol.replay.agent_videos import AgentVideos
 from bootifol.types import FrameBatch, Video
 
 STILL = AugmentationConfig("always", brightness=0, contrast=0, noise=0, blur=0)

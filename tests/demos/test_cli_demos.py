@@ -9,8 +9,8 @@ from bootifol.cli.main import main
 from bootifol.demos import record as recording
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.demos.manifest import Manifest
-from bootifol.demos.video_writing import write_video
 from bootifol.errors import BootifolError
+from bootifol.video_files.writing import write_video
 
 
 def record(out: Path, *more: str) -> int:

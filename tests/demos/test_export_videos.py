@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from small_demo_sets import WriteSet
-from whole_videos import read_video
+from tests.video_files.whole_videos import read_video
 
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.export_videos import Format, export_videos
 from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.demos.manifest import read_manifest, write_manifest
-from bootifol.demos.video_files import frame_rate, video_paths
 from bootifol.errors import BootifolError
+from bootifol.video_files.reading import frame_rate, video_paths
 
 MEAN_ERROR = {"mp4": 2.0, "lerobot": 0.6}
 """Bounds in levels of 255 for smooth pictures; 1.3 and 0.4 were measured."""

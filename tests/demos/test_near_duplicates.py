@@ -1,13 +1,13 @@
 from pathlib import Path
 
 import numpy as np
-from test_looks import walking_block
-from whole_videos import read_video
+from test_video_statistics import walking_block
+from tests.video_files.whole_videos import read_video
 
-from bootifol.demos.looks import look_at
 from bootifol.demos.near_duplicates import near_duplicates
-from bootifol.demos.video_writing import write_video
+from bootifol.demos.video_statistics import statistics_of
 from bootifol.envs.pictures import centered_square
+from bootifol.video_files.writing import write_video
 
 
 def test_a_video_compressed_again_is_found(tmp_path: Path) -> None:
@@ -15,7 +15,7 @@ def test_a_video_compressed_again_is_found(tmp_path: Path) -> None:
     write_video(tmp_path / "again.mp4", videos[1], 10)
     again = np.stack([centered_square(frame, 32) for frame in read_video(tmp_path / "again.mp4")])
     assert (again != videos[1]).any()
-    digests = np.stack([look_at(video).digest for video in [*videos, again]])
+    digests = np.stack([statistics_of(video).digest for video in [*videos, again]])
     assert near_duplicates(digests) == [[1, 3]]
 
 

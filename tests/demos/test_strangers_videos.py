@@ -11,13 +11,14 @@ import pytest
 from PIL import Image
 
 from bootifol.cli.main import main
-from bootifol.demos import folders_and_arrays, import_videos
+from bootifol.demos import import_videos
 from bootifol.demos.demo_set import DemoSet
-from bootifol.demos.lerobot import _is_harmless
-from bootifol.demos.picture_order import natural_order
-from bootifol.demos.upright import TimedFrame
-from bootifol.demos.video_files import stream_video
 from bootifol.errors import BootifolError
+from bootifol.video_files import folders_and_arrays
+from bootifol.video_files.lerobot_reading import _is_harmless
+from bootifol.video_files.orientation import TimedFrame
+from bootifol.video_files.picture_order import natural_order
+from bootifol.video_files.reading import stream_video
 
 FRAME = np.zeros((8, 8, 3), np.uint8)
 

@@ -13,8 +13,8 @@ import pytest
 
 from bootifol.cli.main import main
 from bootifol.demos.demo_set import DemoSet
-from bootifol.demos.video_writing import write_video
 from bootifol.training.run_config import RunConfig
+from bootifol.video_files.writing import write_video
 
 ROBOT = '''
 import gymnasium

@@ -18,9 +18,9 @@ from PIL import Image
 from bootifol.cli.main import DESCRIPTION, main
 from bootifol.demos.augmentation import AugmentedVideos
 from bootifol.demos.demo_set import DemoSet
-from bootifol.demos.video_writing import write_video
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.types import FrameBatch
+from bootifol.video_files.writing import write_video
 
 SMALL = ["--agent-size", "32", "--video-size", "32"]
 SMALL_RUN = [

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from bootifol.demos.video_writing import write_video
 from bootifol.evaluation.tables import EvaluationRow, RankingRow, append_evaluations, append_ranking
 from bootifol.files import write_arrays
 from bootifol.types import Arrays, Frames
+from bootifol.video_files.writing import write_video
 
 AGENT_STEPS = 60_000
 EXPERT_RETURN, RANDOM_RETURN = 48.0, 1.1

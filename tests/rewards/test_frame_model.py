@@ -9,8 +9,8 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from bootifol.demos.agent_videos import AgentVideos
 from bootifol.errors import BootifolError
+from bootifol.replay.agent_videos import AgentVideos
 from bootifol.rewards.bootifol.frames.config import FrameConfig
 from bootifol.rewards.bootifol.frames.model import FrameRewardModel
 from bootifol.types import FrameBatch, Video

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from tiny_runs import TINY, WITH_DEMONSTRATIONS, new_run, resumed
 
+from bootifol import api
 from bootifol.evaluation.tables import read_ranking
 from bootifol.networks.backbones import Backbone
 from bootifol.rewards.registry import RewardConfig
-from bootifol.training.api import score_videos
 from bootifol.training.config import TrainingConfig
 from bootifol.training.interactive import InteractivePhase
 from bootifol.types import Features, Frames
@@ -68,7 +68,7 @@ def test_videos_to_report_with_every_frame_read_once(
     assert np.isfinite([row.reward for row in read_ranking(tmp_path / "run" / "ranking.csv").rows]).all()
     assert (tmp_path / "run" / "showcase.safetensors").is_file()
     counted.clear()
-    scores = score_videos(tmp_path / "run", [own_demos / "expert"])
+    scores = api.score(tmp_path / "run", [own_demos / "expert"])
     assert len(counted) == 12 * FRAMES  # those given; the references' are on disk
     assert all(len(rewards) == FRAMES - 1 and np.isfinite(rewards).all() for rewards in scores.values())
 

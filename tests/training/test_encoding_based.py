@@ -11,12 +11,12 @@ import pytest
 from rich.console import Console
 from tiny_runs import ENCODING_BASED, new_run
 
+from bootifol import api
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.registry import RewardConfig
-from bootifol.training.api import evaluate_run
-from bootifol.training.components import build_agent, build_reward_model
+from bootifol.training.build import build_agent, build_reward_model
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 from bootifol.types import Action, Video
@@ -45,7 +45,7 @@ def test_a_finished_run_is_evaluated_with_its_own_encoder(
     run.finish()
     finals = np.stack(actions)
     actions.clear()
-    evaluate_run(tmp_path / "run", SHORT.evaluation.final_episodes, seed=run.run.seed)
+    api.evaluate(tmp_path / "run", SHORT.evaluation.final_episodes, seed=run.run.seed)
     assert len(np.unique(finals, axis=0)) > 10
     np.testing.assert_array_equal(np.stack(actions), finals)
 

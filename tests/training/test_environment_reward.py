@@ -12,7 +12,7 @@ from tiny_runs import IMITATING_RUNS, WITH_DEMONSTRATIONS, new_run
 
 from bootifol.envs.rollout import play_episode
 from bootifol.errors import BootifolError
-from bootifol.training import components
+from bootifol.training import build
 from bootifol.training.config import TrainingConfig
 
 
@@ -26,8 +26,8 @@ class NaNReward(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 @pytest.fixture
 def nan_rewards(monkeypatch: pytest.MonkeyPatch) -> None:
-    make = components.make_environment
-    monkeypatch.setattr(components, "make_environment", lambda *arguments: NaNReward(make(*arguments)))
+    make = build.make_environment
+    monkeypatch.setattr(build, "make_environment", lambda *arguments: NaNReward(make(*arguments)))
 
 
 @pytest.mark.parametrize(("method", "config"), IMITATING_RUNS)

@@ -7,11 +7,11 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tests.demos.whole_videos import read_video
+from tests.video_files.whole_videos import read_video
 
+from bootifol import api
 from bootifol.cli.main import main
-from bootifol.demos.video_files import frame_rate
-from bootifol.training.api import evaluate_run
+from bootifol.video_files.reading import frame_rate
 
 
 @pytest.fixture(autouse=True)
@@ -25,7 +25,7 @@ def table(path: str) -> list[dict[str, str]]:
 
 
 def test_one_run_is_told_written_and_filmed(finished: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    result = evaluate_run(finished, episodes=3)
+    result = api.evaluate(finished, episodes=3)
     command = ["evaluate", str(finished), "--episodes", "3", "--out", "made/played.csv", "--videos", "films"]
     assert main(command) == 0
     said = capsys.readouterr().out
@@ -56,7 +56,7 @@ def test_several_runs_get_a_line_each_in_their_order(
     shutil.copytree(finished, "other[1]")
     runs = ["other[1]", str(finished)]
     assert main(["evaluate", *runs, "--episodes", "2", "--out", "played.csv", "--videos", "films"]) == 0
-    result = evaluate_run(finished, episodes=2)
+    result = api.evaluate(finished, episodes=2)
     assert result.scaled_return is not None
     told = (
         f"mean return {result.summary.mean:.1f}, scaled return {result.scaled_return:.3f}, "

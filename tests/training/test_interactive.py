@@ -15,7 +15,7 @@ from tiny_runs import TINY, new_run
 
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.rewards.registry import METHODS
-from bootifol.training import components
+from bootifol.training import build
 from bootifol.training.train import Run
 from bootifol.types import Action, Arrays, Metrics, Observation, Rewards, Video, VideoSource
 
@@ -119,7 +119,7 @@ def number(name: str) -> int:
 def known_reward(monkeypatch: pytest.MonkeyPatch) -> KnownReward:
     """What runs learn with in this test."""
     model = KnownReward()
-    monkeypatch.setattr(components, "build_reward_model", lambda _: model)
+    monkeypatch.setattr(build, "build_reward_model", lambda _: model)
     return model
 
 

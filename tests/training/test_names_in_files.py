@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import bootifol
-from bootifol import own_modules
+from bootifol import plugins
 from bootifol.cli.main import main
 from bootifol.errors import BootifolError
 
@@ -27,7 +27,7 @@ def evil(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         f"open({str(mark)!r}, 'w').close()\ndef make(*_):\n    raise SystemExit(0)\n"
     )
     monkeypatch.chdir(here)
-    monkeypatch.setattr(own_modules, "_allowed", set())
+    monkeypatch.setattr(plugins, "_allowed", set())
     yield mark
     sys.modules.pop("evil", None)
     if str(here) in sys.path:

@@ -13,7 +13,7 @@ from benchmarks.page_modules import ADD_A_METHOD, write_page_modules
 from tiny_runs import ENDS_SOON
 
 import bootifol
-from bootifol import own_modules
+from bootifol import plugins
 from bootifol.cli.main import main
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
@@ -81,7 +81,7 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     write_page_modules(ADD_A_METHOD, site)
     (site / "brought_tasks.py").write_text(TASKS)
     monkeypatch.syspath_prepend(site)
-    monkeypatch.setattr(own_modules, "_allowed", set())
+    monkeypatch.setattr(plugins, "_allowed", set())
     for module in ("optimal_transport", "brought_tasks", "variants"):  # of another test
         monkeypatch.delitem(sys.modules, module, raising=False)
     yield site
@@ -133,7 +133,7 @@ def test_a_method_of_a_package_trains_and_its_run_is_trusted_like_other_code(
     )
     assert not trained.finished
     assert json.loads((run / "config.json").read_text())["method"] == "sinkhorn"
-    monkeypatch.setattr(own_modules, "_allowed", set())  # as in another process
+    monkeypatch.setattr(plugins, "_allowed", set())  # as in another process
     with pytest.raises(BootifolError, match=r"names the method 'sinkhorn', which is code .* add --trust"):
         bootifol.resume(run)
     assert not bootifol.resume(run, trust=True, callbacks=[Stops()])

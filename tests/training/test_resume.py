@@ -19,9 +19,9 @@ from bootifol.evaluation.tables import EvaluationRow, RankingRow, append_evaluat
 from bootifol.files import read_arrays, read_json
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.config import TrainingConfig
-from bootifol.training.demonstrations import Demonstrations
+from bootifol.training.evaluator import Evaluator
+from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.training.interactive import InteractivePhase
-from bootifol.training.measurements import Measurements
 from bootifol.training.train import Run
 
 
@@ -136,13 +136,13 @@ def test_stops_at_any_moment_leave_the_uninterrupted_run(
     new_run(tmp_path / "parts", demos, config=WITH_DEMONSTRATIONS)
     moments = [
         (Run, "_checkpoint_if_due", 4),
-        (Measurements, "rank", 1),
+        (Evaluator, "rank", 1),
         (InteractivePhase, "_update_agent", 17),
         (InteractivePhase, "_update_agent", 25),
         (DrQv2, "clone", 4),
-        (Measurements, "_play", 1),
+        (Evaluator, "_play", 1),
         (InteractivePhase, "_update_agent", 30),
-        (Measurements, "_play", 2),
+        (Evaluator, "_play", 2),
         (InteractivePhase, "_update_agent", 40),
     ]
     for owner, name, call in moments:

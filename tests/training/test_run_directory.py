@@ -15,14 +15,14 @@ import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tiny_runs import ENDS_SOON, TINY, new_run, record_demos, resumed
 
+from bootifol import api
 from bootifol.cli.main import main
 from bootifol.demos.demo_set import DemoSet
 from bootifol.errors import BootifolError
 from bootifol.files import read_json
 from bootifol.locks import one_writer
 from bootifol.tracking import RunLog, TensorBoard, cut_metrics
-from bootifol.training import components
-from bootifol.training.api import continue_run, train_policy
+from bootifol.training import build
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.train import Run
@@ -44,7 +44,7 @@ def test_a_copy_without_checkpoints_is_not_begun_anew(run: Path) -> None:
     shutil.rmtree(run / "checkpoints")
     before = contents(run)
     with pytest.raises(BootifolError, match=r"no checkpoint to go on from.*lose its metrics.jsonl"):
-        continue_run(run)
+        api.resume(run)
     assert contents(run) == before
 
 
@@ -52,7 +52,7 @@ def test_stray_checkpoints_are_not_taken_over(run: Path, demos: Path) -> None:
     (run / "config.json").unlink()
     before = contents(run)
     with pytest.raises(BootifolError, match=r"holds metrics.jsonl, .*checkpoints of a run whose config"):
-        train_policy("drawn_reach", demos, run, seed=7, config=ENDS_SOON)
+        api.train("drawn_reach", demos, run, seed=7, config=ENDS_SOON)
     assert contents(run) == before
 
 
@@ -76,7 +76,7 @@ def test_other_videos_at_the_same_place_are_refused(tmp_path: Path, demos: Path)
         record_demos(Path(own))
     before = contents(tmp_path / "run")
     with pytest.raises(BootifolError, match=r"the expert videos in .* are not the ones that"):
-        continue_run(tmp_path / "run")
+        api.resume(tmp_path / "run")
     assert main(["score", str(tmp_path / "run"), str(own)]) == 2
     assert contents(tmp_path / "run") == before
 
@@ -84,7 +84,7 @@ def test_other_videos_at_the_same_place_are_refused(tmp_path: Path, demos: Path)
 def test_two_writers_are_one_too_many(run: Path, demos: Path, tmp_path: Path) -> None:
     before = contents(run)
     with one_writer(run):
-        for write in (lambda: continue_run(run), lambda: train_policy("drawn_reach", demos, run)):
+        for write in (lambda: api.resume(run), lambda: api.train("drawn_reach", demos, run)):
             with pytest.raises(BootifolError, match="another process is writing to"):
                 write()
     assert contents(run) == before
@@ -101,7 +101,7 @@ def test_a_link_that_leaves_the_run_is_not_written_through(run: Path, tmp_path: 
         target.mkdir()
     (run / name).symlink_to(target)
     with pytest.raises(BootifolError, match=f"{name} is a link that leaves the run"):
-        continue_run(run)
+        api.resume(run)
 
 
 @pytest.mark.parametrize(("kept", "lines"), [(10_000, 3), (25, 3), (24, 2), (23, 1), (11, 0)])
@@ -184,7 +184,7 @@ def test_large_sets_are_verified_while_the_run_learns(
     tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own = Path(shutil.copytree(demos, tmp_path / "demos"))
-    monkeypatch.setattr(components, "_VERIFY_BELOW_BYTES", 0)
+    monkeypatch.setattr(build, "_VERIFY_BELOW_BYTES", 0)
     shard = own / "random" / "shard-00000.npy"
     flipped = bytearray(shard.read_bytes())
     flipped[-1] ^= 1

@@ -15,11 +15,11 @@ import pytest
 from tiny_runs import ENCODING_BASED, ENDS_SOON, PICTURES, SEEING, TINY, new_run
 
 import bootifol
+from bootifol import api
 from bootifol.envs.rollout import PlayedEpisode, play_episode
 from bootifol.errors import BootifolError
 from bootifol.evaluation import returns
 from bootifol.files import read_arrays
-from bootifol.training.api import evaluate_run
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.train import Run
 from bootifol.types import Episode
@@ -41,7 +41,7 @@ def played(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], list[Episode]]:
 
         with monkeypatch.context() as patch:
             patch.setattr(returns, "play_episode", noting)
-            evaluate_run(run, episodes=2)
+            api.evaluate(run, episodes=2)
         return episodes
 
     return play
@@ -135,6 +135,6 @@ def test_the_example_plays_an_episode(
     said = capsys.readouterr().out
     assert "drawn_reach, after 90 agent steps: 10 actions a second" in said
     assert f"return {play(str(finished)):.1f}\n" in said
-    results = evaluate_run(finished, episodes=12).episodes
+    results = api.evaluate(finished, episodes=12).episodes
     assert [play(str(finished), one.seed) for one in results] == [one.environment_return for one in results]
     assert len({one.environment_return for one in results}) > 1

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from tiny_runs import PICTURES, TINY, new_run
 
+from bootifol import api
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.demos.record import record
-from bootifol.demos.video_writing import write_video
 from bootifol.errors import BootifolError
-from bootifol.training.api import read_videos, score_videos
 from bootifol.training.run_config import RunConfig
+from bootifol.video_files.writing import write_video
 
 SHORT = replace(TINY, interactive=replace(TINY.interactive, agent_steps=30))
 
@@ -26,7 +26,7 @@ def test_videos_are_scored_as_far_as_the_method_can_compare(tmp_path: Path, demo
     assert new_run(tmp_path / "run", demos, method, SHORT).learn()
     size = SHORT.pictures.video_size
     np.save(tmp_path / "long.npy", np.random.default_rng(0).integers(0, 256, (90, size, size, 3), np.uint8))
-    (rewards,) = score_videos(tmp_path / "run", [tmp_path / "long.npy"]).values()
+    (rewards,) = api.score(tmp_path / "run", [tmp_path / "long.npy"]).values()
     expert_steps = len(np.load(next((demos / "expert").glob("*.npy")), mmap_mode="r")[0]) - 1
     assert len(rewards) == (89 if method == "gaifo" else expert_steps)
     assert np.isfinite(rewards).all()
@@ -46,15 +46,15 @@ def test_a_file_is_scored_as_the_video_that_an_import_makes_of_it(
     record("drawn_reach", "random", 4, tmp_path / "mine" / "random", PICTURES)
     monkeypatch.chdir(tmp_path)
     assert new_run(Path("run"), Path("mine"), config=SHORT).learn()
-    of_set = list(score_videos("run", ["mine/expert"]).values())
-    of_files = list(score_videos("run", clips).values())
+    of_set = list(api.score("run", ["mine/expert"]).values())
+    of_files = list(api.score("run", clips).values())
     assert len(of_set) == len(of_files) == 4
     np.testing.assert_array_equal(of_files, of_set)
     assert len({rewards.tobytes() for rewards in of_set}) == 4
 
     monkeypatch.chdir(tmp_path / "clips")
     with pytest.raises(BootifolError, match="are not at mine: give the command in the directory in which"):
-        score_videos("../run", clips)
+        api.score("../run", clips)
 
 
 def test_a_file_is_cropped_as_the_import_was(tmp_path: Path, demos: Path) -> None:
@@ -67,6 +67,6 @@ def test_a_file_is_cropped_as_the_import_was(tmp_path: Path, demos: Path) -> Non
     conversion = Conversion(len(scene), size, crop=(5, 9, size))
     imported = import_videos([tmp_path / "scene.npy"], tmp_path / "mine" / "expert", conversion)
     run = RunConfig("drawn_reach", "bootifol", "smoke", 1, str(tmp_path / "mine"), None, SHORT)
-    (video,) = read_videos(tmp_path / "scene.npy", run)
+    (video,) = api.read_videos(tmp_path / "scene.npy", run)
     np.testing.assert_array_equal(video.frames, scene[:, 9:, 5 : 5 + size])
     np.testing.assert_array_equal(video.frames, imported[0].frames)

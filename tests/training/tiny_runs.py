@@ -14,7 +14,7 @@ from bootifol.presets import SMOKE
 from bootifol.rewards.bootifol.frames.config import FrameConfig
 from bootifol.rewards.registry import METHODS, RewardConfig
 from bootifol.training.config import AlignmentConfig, InteractiveConfig, TrainingConfig
-from bootifol.training.demonstrations import DemonstrationConfig
+from bootifol.training.inferred_demonstrations import DemonstrationConfig
 from bootifol.training.run_config import RunConfig
 from bootifol.training.train import Run
 

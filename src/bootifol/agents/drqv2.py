@@ -9,6 +9,7 @@ not, and exploration noise on a linear schedule, which also smooths the targets.
 from __future__ import annotations
 
 import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -27,9 +28,8 @@ from bootifol.agents.networks import (
 )
 from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
-from bootifol.gradient_step import take_step
-from bootifol.module_state import load_module_state, module_state
 from bootifol.networks.eyes import Eyes
+from bootifol.optim import load_module_state, module_state, take_step
 from bootifol.types import Action, Arrays, Batch, Observation, StepMetrics
 
 AnyEncoder = Encoder | EncodingEncoder | StateEncoder
@@ -81,6 +81,18 @@ def noisy_action(mean: Tensor, stddev: float, clip: float | None, generator: tor
     with torch.no_grad():
         offset = (mean + noise).clamp_(-1.0, 1.0) - mean
     return mean + offset
+
+
+@dataclass(frozen=True)
+class Pull:
+    """What keeps the policy near demonstrated actions while it learns from rewards. Not in DrQ-v2."""
+
+    rows: Tensor
+    """Which of a batch are demonstrated, int64 `[D]`."""
+    action: Tensor
+    """What was done there, `[D, A]`."""
+    weight: Tensor
+    """Of the cloning loss, a scalar."""
 
 
 class DrQv2:
@@ -206,7 +218,7 @@ class DrQv2:
         return {"agent/cloning_loss": loss.detach()}
 
     def update(self, batch: Batch, agent_steps: float) -> StepMetrics:
-        """One update of critic and encoder, of the actor, and of the target critic, in this order.
+        """One update of critic and encoder, of the actor, and of the target critic, in this order: Algorithm 1.
 
         Nothing in it waits for a GPU, and metrics stay there until they are logged.
 
@@ -214,65 +226,106 @@ class DrQv2:
             BootifolError: a loss is NaN or infinite (see `take_step`); the parameters are as before the step that
                 failed.
         """
+        # "Compute stddev for the exploration noise."
         stddev = self.config.exploration(agent_steps)
-        observation = self._network_input(batch.observation, self._precision)
-        next_observation = self._network_input(batch.next_observation, self._precision)
-        action, reward, discount = (
-            to_device(tensor, self._device) for tensor in (batch.action, batch.reward, batch.discount)
-        )
+        # "Sample a mini batch of transitions" and "apply data augmentation": replay has done both.
+        batch = self._on_device(batch)
+        # UpdateCritic, of which the encoder learns too.
+        features, pull, critic_metrics = self.update_critic(batch, stddev)
+        # UpdateActor, of which it does not.
+        actor_metrics = self.update_actor(features.detach(), stddev, pull)
+        # "Update critic target weights."
+        self.update_target()
+        # Beyond DrQ-v2: averages act in evaluations.
+        self._average()
+        return {**critic_metrics, **actor_metrics, "agent/exploration": stddev}
 
+    def update_critic(self, batch: Batch, stddev: float) -> tuple[Tensor, Pull | None, StepMetrics]:
+        """One step of both critics and of the encoder (UpdateCritic).
+
+        Args:
+            batch: on the agent's device, observations as the encoder reads them.
+            stddev: of the noise that smooths the target.
+
+        Returns:
+            Features of the observations, `[B, feature_count]`, as they were before the step; what pulls the policy
+            to demonstrated actions, None where nothing does; metrics.
+        """
+        # "Sample action" of the later frame, and the target of equation 1.
         with torch.no_grad(), self._autocast():
-            next_features = self.encoder(next_observation)
+            next_features = self.encoder(batch.next_observation)
             next_action = self._noisy(self.actor(next_features), stddev)
-            target = critic_target(reward, discount, *self.target_critic(next_features, next_action))
+            next_q = self.target_critic(next_features, next_action)
+            target = critic_target(batch.reward, batch.discount, *next_q)
+        # "Compute the critic losses using equation 1."
         with self._autocast():
-            features = self.encoder(observation)
-            q1, q2 = self.critic(features, action)
+            features = self.encoder(batch.observation)
+            q1, q2 = self.critic(features, batch.action)
         loss_of_critic = critic_loss(q1, q2, target)
-        rows = None
-        if self.config.cloning_weight > 0 and batch.demonstrated is not None:
-            # As numbers: how many rows a mask has, a GPU would have to tell the host first.
-            rows = to_device(batch.demonstrated.nonzero().squeeze(1), self._device)
-        # Times the mean of |Q|, so that one weight suits rewards of any scale (as TD3+BC: Fujimoto and Gu, 2021).
-        # The critic starts near 0, and without a floor its first errors would undo the clone.
-        cloning_weight = self.config.cloning_weight * q1.detach().abs().mean().clamp(min=1.0)
-        loss_of_encoder = loss_of_critic
-        if rows is not None:
+        # Beyond DrQ-v2: the encoder learns to tell demonstrated actions as well.
+        loss = loss_of_critic
+        pull = self._pull(batch, q1.detach())
+        if pull is not None:
             with self._autocast():
-                cloned = self.actor(features[rows])
-            loss_of_encoder = loss_of_critic + cloning_weight * cloning_loss(cloned, action[rows])
-        self._step(self._critic_optimizer, loss_of_encoder, "critic")
+                cloned = self.actor(features[pull.rows])
+            loss = loss_of_critic + pull.weight * cloning_loss(cloned, pull.action)
+        # "Update encoder weights" and "update critic weights."
+        self._step(self._critic_optimizer, loss, "critic")
+        metrics = {
+            "agent/critic_loss": loss_of_critic.detach(),
+            "agent/q": q1.detach().mean(),
+            "agent/target": target.mean(),
+            "agent/batch_reward": batch.reward.mean(),
+        }
+        return features, pull, metrics
 
-        features = features.detach()
+    def update_actor(self, features: Tensor, stddev: float, pull: Pull | None) -> StepMetrics:
+        """One step of the actor (UpdateActor).
+
+        Args:
+            features: of the observations, `[B, feature_count]`, without a gradient.
+            stddev: of the noise on the actions that the critic judges.
+            pull: to demonstrated actions; None where there is none.
+        """
         with torch.no_grad(), self._autocast():
             trunk = self.critic.trunk(features)
-        metrics: dict[str, float | Tensor] = {}
         with self._autocast():
+            # "Sample action."
             before_tanh = self.actor.before_tanh(features)
             mean_action = torch.tanh(before_tanh)
-            loss_of_actor = actor_loss(*self.critic.value(trunk, self._noisy(mean_action, stddev)))
+            # "Compute the actor loss using equation 2."
+            loss = actor_loss(*self.critic.value(trunk, self._noisy(mean_action, stddev)))
+        metrics: dict[str, Tensor] = {}
+        # Beyond DrQ-v2: actions that saturate, and those that leave what was demonstrated, cost something.
         if self.config.saturation_weight > 0:
-            loss_of_actor = loss_of_actor + self.config.saturation_weight * saturation_loss(before_tanh)
-        if rows is not None:
-            loss_of_cloning = cloning_loss(mean_action[rows], action[rows])
-            loss_of_actor = loss_of_actor + cloning_weight * loss_of_cloning
+            loss = loss + self.config.saturation_weight * saturation_loss(before_tanh)
+        if pull is not None:
+            loss_of_cloning = cloning_loss(mean_action[pull.rows], pull.action)
+            loss = loss + pull.weight * loss_of_cloning
             metrics["agent/cloning_loss"] = loss_of_cloning.detach()
-        self._step(self._actor_optimizer, loss_of_actor, "actor")
+        # "Update actor's weights only."
+        self._step(self._actor_optimizer, loss, "actor")
+        metrics["agent/actor_loss"] = loss.detach()
+        metrics["agent/saturated"] = (mean_action.detach().abs() > SATURATED).float().mean()
+        return metrics
 
+    def update_target(self) -> None:
+        """Moves the target critic a fraction `tau` of the way to the critic."""
         with torch.no_grad():
             torch._foreach_lerp_(
                 list(self.target_critic.parameters()), list(self.critic.parameters()), self.config.tau
             )
-        self._average()
-        return metrics | {
-            "agent/critic_loss": loss_of_critic.detach(),
-            "agent/actor_loss": loss_of_actor.detach(),
-            "agent/q": q1.detach().mean(),
-            "agent/target": target.mean(),
-            "agent/batch_reward": reward.mean(),
-            "agent/exploration": stddev,
-            "agent/saturated": (mean_action.detach().abs() > SATURATED).float().mean(),
-        }
+
+    def _pull(self, batch: Batch, q1: Tensor) -> Pull | None:
+        """What of a batch pulls to demonstrated actions, given Q `[B]`; None where nothing does."""
+        if self.config.cloning_weight == 0 or batch.demonstrated is None:
+            return None
+        # As numbers: how many rows a mask has, a GPU would have to tell the host first.
+        rows = to_device(batch.demonstrated.nonzero().squeeze(1), self._device)
+        # Times the mean of |Q|, so that one weight suits rewards of any scale (as TD3+BC: Fujimoto and Gu, 2021).
+        # The critic starts near 0, and without a floor its first errors would undo the clone.
+        weight = self.config.cloning_weight * q1.abs().mean().clamp(min=1.0)
+        return Pull(rows, batch.action[rows], weight)
 
     def _average(self) -> None:
         if self._averaged is None:
@@ -331,6 +384,18 @@ class DrQv2:
         if observation.dtype == torch.int8:
             return to_device(observation, self._device)
         return to_device(observation, self._device).to(dtype)
+
+    def _on_device(self, batch: Batch) -> Batch:
+        """A batch where the agent computes, its observations as the encoder reads them; which rows are demonstrated
+        stays with the host."""
+        return replace(
+            batch,
+            observation=self._network_input(batch.observation, self._precision),
+            next_observation=self._network_input(batch.next_observation, self._precision),
+            action=to_device(batch.action, self._device),
+            reward=to_device(batch.reward, self._device),
+            discount=to_device(batch.discount, self._device),
+        )
 
     @property
     def _precision(self) -> torch.dtype:

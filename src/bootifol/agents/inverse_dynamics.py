@@ -14,8 +14,7 @@ from torch import Tensor, nn
 from bootifol.agents.config import EncoderName, Precision
 from bootifol.agents.networks import Encoder, StateEncoder
 from bootifol.devices import to_device, to_host
-from bootifol.gradient_step import take_step
-from bootifol.module_state import load_module_state, module_state
+from bootifol.optim import load_module_state, module_state, take_step
 from bootifol.types import Arrays, Batch, Frames, FrameStates, StepMetrics
 
 

@@ -22,7 +22,7 @@ from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
 from bootifol.files import parsed_json, read_arrays, read_texts, write_arrays
 from bootifol.networks.eyes import Eyes, as_features
-from bootifol.own_modules import told
+from bootifol.plugins import told
 from bootifol.types import Action, Arrays, Frame, Observation
 
 FORMAT = 1

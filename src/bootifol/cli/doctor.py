@@ -184,8 +184,8 @@ def milliseconds_by_threads(counts: list[int]) -> dict[int, tuple[float, float]]
     import torch
 
     from bootifol.agents.drqv2 import DrQv2
-    from bootifol.demos.agent_videos import AgentVideos
     from bootifol.presets import CPU
+    from bootifol.replay.agent_videos import AgentVideos
     from bootifol.rewards.bootifol.model import BootifolRewardModel
     from bootifol.types import Batch, Video
 

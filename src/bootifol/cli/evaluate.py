@@ -12,7 +12,7 @@ from bootifol.cli.arguments import RunPaths, Trust
 from bootifol.errors import BootifolError
 
 if TYPE_CHECKING:
-    from bootifol.training.api import RunEvaluation
+    from bootifol.api import RunEvaluation
 
 
 def evaluate(
@@ -34,8 +34,8 @@ def evaluate(
         trust: Import the code that the runs name as their task (MODULE:NAME); other runs need none.
     """
     # Imported here: help should not wait for PyTorch.
+    from bootifol import api
     from bootifol.evaluation.tables import PlayedRow, write_played
-    from bootifol.training.api import evaluate_run
     from bootifol.training.run_config import RunConfig
     from bootifol.training.saved_policy import require_checkpoint
 
@@ -50,7 +50,7 @@ def evaluate(
     for run, folder in zip(runs, folders, strict=True):
         if len(runs) > 1:
             console.print(str(run), markup=False, soft_wrap=True)
-        result = evaluate_run(run, episodes, seed, folder, bool(trust))
+        result = api.evaluate(run, episodes, seed, folder, bool(trust))
         rows += [PlayedRow(**asdict(row), run=str(run)) for row in result.rows]
         lines.append(f"{run}: {_in_a_line(result)}")
         _print(result, console)

@@ -16,7 +16,7 @@ from rich.text import Text
 from bootifol.cli.help_texts import join_lines
 from bootifol.errors import STOPPED, BootifolError, BootifolWarning, is_lack_of_memory, printable
 from bootifol.output import output_may_fail
-from bootifol.own_modules import told
+from bootifol.plugins import told
 
 DESCRIPTION = """Videos in, policy out: learns a reward from videos of a task, and trains a pixel policy on it.
 

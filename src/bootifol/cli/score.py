@@ -27,16 +27,16 @@ def score(
         picture: PNG file to draw the reward of every step to, above the film strips of the first six videos.
         trust: Import the code that the run names as its task or method (MODULE:NAME); other runs need none.
     """
+    from bootifol import api
     from bootifol.reports.film_strip import rewards_above_film_strips
     from bootifol.reports.style import RUN_COLORS, require_png, save_png
-    from bootifol.training.api import scored_videos, write_scores
     from bootifol.types import Rewards, Video
 
     if picture is not None:
         require_png(picture)
     rewards: dict[str, Rewards] = {}
     shown: list[tuple[Video, Rewards]] = []
-    for video, of_video in scored_videos(run, videos, bool(trust)):
+    for video, of_video in api.scored_videos(run, videos, bool(trust)):
         rewards[video.name] = of_video
         if picture is not None and len(shown) < len(RUN_COLORS):
             shown.append((video, of_video))
@@ -45,7 +45,7 @@ def score(
         table.add_row(Text(name), str(len(of_video)), f"{of_video.mean():.4f}", f"{of_video.sum():.2f}")
     Console().print(table)
     if out is not None:
-        write_scores(out, rewards)
+        api.write_scores(out, rewards)
         Console().print(f"every step's reward: {out}", markup=False)
     if picture is not None:
         save_png(rewards_above_film_strips(shown), picture)

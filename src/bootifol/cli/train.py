@@ -16,7 +16,7 @@ import tyro
 from bootifol.cli.arguments import Flag, Trust
 from bootifol.cli.help_texts import field_texts
 from bootifol.errors import STOPPED, BootifolError
-from bootifol.own_modules import imports_code, require_trust
+from bootifol.plugins import imports_code, require_trust
 from bootifol.presets import PresetName, preset
 from bootifol.tasks import short_name
 from bootifol.training.config import TrainingConfig
@@ -153,7 +153,7 @@ def train(
         words: What was typed.
     """
     # Imported here: help should not wait for PyTorch.
-    from bootifol.training.api import continue_run, train_policy
+    from bootifol import api
     from bootifol.training.budget import parse_duration
 
     if resume is not None:
@@ -162,7 +162,7 @@ def train(
                 f"--resume goes on with the configuration that {resume} was begun with and would ignore "
                 f"{', '.join(ignored)}: leave out all but --resume, or begin a new run with --demos and --out"
             )
-        finished = continue_run(resume, trust=True) if trust else continue_run(resume)
+        finished = api.resume(resume, trust=True) if trust else api.resume(resume)
         return 0 if finished else STOPPED
     if config is not None:
         _require_trust_of_names(config, {"task": task, "method": method}, words, bool(trust))
@@ -192,7 +192,7 @@ def train(
             + videos
         )
     seconds = None if time_budget is None else parse_duration(time_budget)
-    run = train_policy(
+    run = api.train(
         task or _task_shown(demos, bool(trust)),
         demos,
         out,

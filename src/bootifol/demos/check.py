@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from bootifol.demos.appearance import (
+from bootifol.demos.contact_sheet import write_contact_sheet
+from bootifol.demos.demo_set import DemoSet, listed
+from bootifol.demos.manifest import Manifest, VideoEntry
+from bootifol.demos.near_duplicates import near_duplicates
+from bootifol.demos.scene_match import (
     FIRST_FRAMES_NAME,
     differences_of_looks,
     first_frames,
     write_first_frames,
 )
-from bootifol.demos.contact_sheet import write_contact_sheet
-from bootifol.demos.demo_set import DemoSet, listed
-from bootifol.demos.looks import Looks, look_at
-from bootifol.demos.manifest import Manifest, VideoEntry
-from bootifol.demos.near_duplicates import near_duplicates
+from bootifol.demos.video_statistics import VideoStatistics, statistics_of
 from bootifol.envs.pictures import PictureConfig
 from bootifol.progress import progress
 from bootifol.tasks import Task, frames_per_second
@@ -141,7 +141,7 @@ def check_demo_set(path: Path, task: Task | None = None) -> CheckedSet:
     )
 
 
-def find_defects(manifest: Manifest, looks: Sequence[Looks]) -> Defects:
+def find_defects(manifest: Manifest, looks: Sequence[VideoStatistics]) -> Defects:
     """What is wrong with single videos; those of nobody acting, or of a half-good one, may stand still.
 
     Args:
@@ -181,11 +181,11 @@ def find_defects(manifest: Manifest, looks: Sequence[Looks]) -> Defects:
     )
 
 
-def _look_at_all(demo_set: DemoSet) -> list[Looks]:
+def _look_at_all(demo_set: DemoSet) -> list[VideoStatistics]:
     looks = []
     with progress(f"looking at {demo_set.manifest.name}", total=len(demo_set)) as advance:
         for index, entry in enumerate(demo_set.manifest.videos):
-            looks.append(look_at(demo_set[index].frames[: entry.length]))
+            looks.append(statistics_of(demo_set[index].frames[: entry.length]))
             advance()
     return looks
 

@@ -9,14 +9,14 @@ from typing import Literal
 import numpy as np
 
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
-from bootifol.demos.lerobot import parquet_library
-from bootifol.demos.lerobot_export import write_lerobot
 from bootifol.demos.shards import sha256_of_frames
-from bootifol.demos.video_writing import exact_rate, write_video
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
 from bootifol.progress import progress
 from bootifol.types import Frames
+from bootifol.video_files.lerobot_reading import parquet_library
+from bootifol.video_files.lerobot_writing import write_lerobot
+from bootifol.video_files.writing import exact_rate, write_video
 
 Format = Literal["mp4", "npy", "lerobot"]
 

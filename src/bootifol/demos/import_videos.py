@@ -15,8 +15,6 @@ import numpy as np
 
 from bootifol.demos.contact_sheet import write_contact_sheet
 from bootifol.demos.demo_set import DemoSet, listed
-from bootifol.demos.kinds import PICTURE_SUFFIXES, VIDEO_SUFFIXES
-from bootifol.demos.lerobot import LeRobotEpisode, lerobot_episodes
 from bootifol.demos.manifest import Manifest, Shard, VideoEntry, installed_versions, write_manifest
 from bootifol.demos.shards import (
     last_frame_held,
@@ -24,8 +22,6 @@ from bootifol.demos.shards import (
     videos_per_shard,
     write_shard,
 )
-from bootifol.demos.upright import TimedFrame
-from bootifol.demos.video_files import frame_rate, is_lerobot_dataset, stream_video, video_paths
 from bootifol.envs.pictures import centered_square, resize
 from bootifol.errors import BootifolError, BootifolWarning, collected_warnings, warn
 from bootifol.files import remove_leftovers, written_aside
@@ -33,6 +29,10 @@ from bootifol.hub import fetched_folder, hub_address, is_hub_address
 from bootifol.locks import one_writer
 from bootifol.progress import progress
 from bootifol.types import Frame, Frames
+from bootifol.video_files.kinds import PICTURE_SUFFIXES, VIDEO_SUFFIXES
+from bootifol.video_files.lerobot_reading import LeRobotEpisode, lerobot_episodes
+from bootifol.video_files.orientation import TimedFrame
+from bootifol.video_files.reading import frame_rate, is_lerobot_dataset, stream_video, video_paths
 
 Source = Path | LeRobotEpisode
 """One recording: a file, a folder of pictures, or one episode of a LeRobot dataset."""

@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from bootifol.demos.appearance import (
-    FIRST_FRAMES_NAME,
-    differences_of_looks,
-    first_frames,
-    write_first_frames,
-)
 from bootifol.demos.check import shown_like
 from bootifol.demos.contact_sheet import write_contact_sheet
 from bootifol.demos.demo_set import DemoSet, find_demo_sets
 from bootifol.demos.manifest import Manifest, Shard, VideoEntry, write_manifest
 from bootifol.demos.matching import REPAIRS, Match, Picture, Repair, difference, fit
+from bootifol.demos.scene_match import (
+    FIRST_FRAMES_NAME,
+    differences_of_looks,
+    first_frames,
+    write_first_frames,
+)
 from bootifol.demos.shards import sha256_of_frames, write_shard
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError

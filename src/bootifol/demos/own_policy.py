@@ -10,7 +10,7 @@ import numpy as np
 from bootifol.envs.any_gymnasium import GymnasiumSimulator
 from bootifol.envs.rollout import Act
 from bootifol.errors import BootifolError
-from bootifol.own_modules import is_own_name, own_callable, told, where
+from bootifol.plugins import is_own_name, own_callable, told, where
 from bootifol.types import Action, Observation
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-import tokenize
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -20,11 +19,8 @@ import numpy as np
 
 from bootifol.demos.manifest import Manifest, Shard
 from bootifol.errors import BootifolError
-from bootifol.files import written_aside
+from bootifol.files import DAMAGED_ARRAY, written_aside
 from bootifol.types import FrameBatch, Frames
-
-DAMAGED_ARRAY = (ValueError, OSError, EOFError, SyntaxError, tokenize.TokenError, MemoryError, TypeError)
-"""What numpy raises at a file that is no array of its own, or a damaged one: it reads headers as Python literals."""
 
 # Opening a set looks at every shard, so a set has few of them; and a shard is what an interrupted recording loses, so
 # they are small.

@@ -25,8 +25,7 @@ from bootifol.envs.other_answers import (
 )
 from bootifol.envs.pictures import PictureConfig, centered_square, is_picture, told_kind
 from bootifol.errors import BootifolError, warn
-from bootifol.own_modules import allow, is_own_name, own_callable, told, where
-from bootifol.plugins import plugins
+from bootifol.plugins import allow, is_own_name, own_callable, plugins, told, where
 from bootifol.types import Action, Frame
 
 PREFIX = "gymnasium:"

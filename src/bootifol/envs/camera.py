@@ -23,7 +23,7 @@ from PIL import Image
 from bootifol.envs.meshes import coarse_meshes
 from bootifol.envs.pictures import RenderProfile
 from bootifol.errors import BootifolError
-from bootifol.own_modules import told
+from bootifol.plugins import told
 from bootifol.types import Frame
 
 

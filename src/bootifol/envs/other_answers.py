@@ -16,7 +16,7 @@ import gymnasium
 import numpy as np
 
 from bootifol.errors import BootifolError
-from bootifol.own_modules import told, where
+from bootifol.plugins import told, where
 
 Environment = gymnasium.Env[Any, Any]
 

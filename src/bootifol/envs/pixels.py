@@ -11,7 +11,7 @@ import numpy as np
 
 from bootifol.envs.pictures import FrameStack, PictureConfig, resize
 from bootifol.errors import BootifolError, EnvironmentFailed
-from bootifol.own_modules import told, where
+from bootifol.plugins import told, where
 from bootifol.types import Action, Frame, Observation
 
 

@@ -13,8 +13,7 @@ from torch import nn
 from torch.nn.modules.batchnorm import _BatchNorm
 
 from bootifol.devices import to_device
-from bootifol.gradient_step import GradientStep
-from bootifol.module_state import generator_array, load_generator, load_module_state, module_state
+from bootifol.optim import GradientStep, generator_array, load_generator, load_module_state, module_state
 from bootifol.rewards.video_checks import checked_videos
 from bootifol.types import Arrays, FrameBatch, Frames, Video, VideoSource
 

@@ -6,7 +6,7 @@ import inspect
 from typing import cast
 
 from bootifol.errors import BootifolError
-from bootifol.own_modules import own_callable, told, where
+from bootifol.plugins import own_callable, told, where
 from bootifol.rewards.base import RewardModel
 
 MEMBERS = (

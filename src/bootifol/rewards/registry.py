@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 
 from bootifol.errors import BootifolError
 from bootifol.networks.backbones import Backbone, load_backbone
-from bootifol.own_modules import is_own_name, own_callable
-from bootifol.plugins import names_of_plugins, plugins
+from bootifol.plugins import is_own_name, names_of_plugins, own_callable, plugins
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.frames.model import FrameRewardModel

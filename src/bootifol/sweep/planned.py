@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
-from bootifol.own_modules import imports_code
+from bootifol.plugins import imports_code
 from bootifol.presets import preset
 from bootifol.rewards.registry import METHODS
 from bootifol.tasks import TASKS, short_name

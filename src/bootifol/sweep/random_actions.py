@@ -23,7 +23,7 @@ from bootifol.evaluation.tables import append_evaluations
 from bootifol.experts import make_random
 from bootifol.progress import progress
 from bootifol.reports.html import report
-from bootifol.training.components import build_environment
+from bootifol.training.build import build_environment
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
 

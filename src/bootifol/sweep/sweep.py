@@ -19,7 +19,7 @@ from rich.console import Console
 from bootifol.devices import usable_cores
 from bootifol.errors import BootifolError
 from bootifol.locks import one_writer
-from bootifol.own_modules import told
+from bootifol.plugins import told
 from bootifol.sweep import worker
 from bootifol.sweep.beside import Place, log_file, note_failure, place_file
 from bootifol.sweep.planned import RANDOM, PlannedRun, missing_videos, record_words

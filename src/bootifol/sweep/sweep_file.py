@@ -26,7 +26,7 @@ from typing import Any
 import yaml
 
 from bootifol.errors import LARGEST_COUNT, LARGEST_SEED, MOST_THREADS, BootifolError, shortened
-from bootifol.own_modules import require_trust, told
+from bootifol.plugins import require_trust, told
 from bootifol.presets import preset
 from bootifol.rewards.registry import check_method
 from bootifol.sweep.planned import RANDOM, Overrides, PlannedRun, names_code

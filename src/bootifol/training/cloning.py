@@ -15,7 +15,7 @@ from bootifol.agents.drqv2 import DrQv2
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
 from bootifol.training.budget import Budget, Counters, Stopwatch
-from bootifol.training.demonstrations import Demonstrations
+from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.types import StepMetrics
 
 INVERSE_DYNAMICS_TIME = 1 / 3

@@ -22,7 +22,7 @@ from bootifol.errors import (
 )
 from bootifol.rewards.registry import RewardConfig
 from bootifol.tracking import TrackerName
-from bootifol.training.demonstrations import DemonstrationConfig
+from bootifol.training.inferred_demonstrations import DemonstrationConfig
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from bootifol.envs.rollout import EpisodeRecorder, rollout
 from bootifol.progress import duration
 from bootifol.rewards.base import SeesFrames
 from bootifol.training.budget import Budget, Counters
-from bootifol.training.components import (
+from bootifol.training.build import (
     Components,
     build_agent,
     build_environment,

@@ -15,9 +15,9 @@ import gymnasium
 import numpy as np
 
 from bootifol.agents.drqv2 import DrQv2
-from bootifol.demos.agent_videos import AgentVideos
 from bootifol.demos.augmentation import AugmentationConfig, augmented
 from bootifol.envs.rollout import Act, EpisodeRecorder, rollout
+from bootifol.replay.agent_videos import AgentVideos
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import Featurizer, RewardModel, SeesFrames
 from bootifol.rewards.references import draw_references
@@ -25,7 +25,7 @@ from bootifol.tracking import Averages
 from bootifol.training.budget import Budget, Counters, Stopwatch
 from bootifol.training.cloning import cloning_due
 from bootifol.training.config import InteractiveConfig
-from bootifol.training.demonstrations import Demonstrations
+from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.types import Action, Arrays, Batch, Observation, VideoSource
 
 
@@ -239,7 +239,7 @@ class InteractivePhase:
         ids = self.replay.episode_ids
         kept = range(max(ids.start, ids.stop - len(self.agent_videos)), ids.stop)
         episode_id = int(self.rng.integers(kept.start, kept.stop))
-        slot = episode_id % self.config.agent_videos
+        slot = self.agent_videos.slot_of(age=ids.stop - 1 - episode_id)
         video = self.agent_videos[slot]
         references = draw_references(self.reward_model, self.expert, self.rng)
         # An episode that ended early stands still in the ring up to the full length; no reward looks ahead at that.

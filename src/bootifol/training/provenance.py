@@ -9,7 +9,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TypedDict
 
-import bootifol
 from bootifol.demos.demo_set import find_demo_sets
 from bootifol.demos.manifest import read_manifest
 from bootifol.errors import BootifolError
@@ -61,7 +60,7 @@ def versions() -> dict[str, str]:
 @cache
 def code_digest() -> str:
     """Of all modules that learn; it changes with every edit of them, which the version of the package does not."""
-    package = Path(bootifol.__file__).parent
+    package = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
         name = path.relative_to(package)

@@ -21,7 +21,7 @@ from bootifol.errors import (
     shortened,
 )
 from bootifol.files import read_json, write_json
-from bootifol.own_modules import require_trust
+from bootifol.plugins import require_trust
 from bootifol.tasks import Task, task_named
 from bootifol.training.config import TrainingConfig
 from bootifol.training.provenance import versions, videos_in

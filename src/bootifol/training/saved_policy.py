@@ -10,8 +10,8 @@ from bootifol.agents.policy import Policy, PolicyConfig, read_policy, write_poli
 from bootifol.envs.pixels import PixelEnvironment
 from bootifol.errors import BootifolError
 from bootifol.hub import fetched_file, hub_address, is_hub_address
+from bootifol.training.build import build_agent, build_environment, build_reward_model, reads_pictures
 from bootifol.training.checkpoint import Progress, load_checkpoint, newest_checkpoint
-from bootifol.training.components import build_agent, build_environment, build_reward_model, reads_pictures
 from bootifol.training.run_config import RunConfig
 from bootifol.types import AnyPath
 

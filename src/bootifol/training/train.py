@@ -1,7 +1,7 @@
 """A run from its first step to its report: Alignment Phase, Interactive Phase, evaluation.
 
 What happens, in order, is `Run.learn` and `Run.finish`; what a phase does is in `alignment.py`, `cloning.py` and
-`interactive.py`, and what is measured on the way in `measurements.py`.
+`interactive.py`, and what is measured on the way in `evaluator.py`.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from bootifol.demos.augmentation import augmented
 from bootifol.devices import chosen_device
 from bootifol.errors import BootifolError, EnvironmentFailed
 from bootifol.evaluation.tables import drop_later_rows
-from bootifol.memory import keep_freed_memory
-from bootifol.own_modules import imports_code
+from bootifol.malloc import keep_freed_memory
+from bootifol.plugins import imports_code
 from bootifol.progress import progress
 from bootifol.rewards.registry import check_method
 from bootifol.tracking import Averages, RunLog, Tracker, cut_metrics, make_tracker, require_tracker
 from bootifol.training.alignment import alignment_phase
 from bootifol.training.budget import Budget, Counters, Stopwatch
+from bootifol.training.build import build_components, build_environment, build_learners, open_demos
 from bootifol.training.callbacks import Callback, Callbacks
 from bootifol.training.checkpoint import (
     Progress,
@@ -38,11 +39,10 @@ from bootifol.training.checkpoint import (
     save_checkpoint,
 )
 from bootifol.training.cloning import cloning_phase, steps_of_a_phase
-from bootifol.training.components import build_components, build_environment, build_learners, open_demos
+from bootifol.training.evaluator import Evaluator
 from bootifol.training.forecast import forecast
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.interruption import Interruption, Stopped
-from bootifol.training.measurements import Measurements
 from bootifol.training.run_config import RunConfig
 from bootifol.training.saved_policy import save_policy
 from bootifol.types import Metrics
@@ -116,7 +116,7 @@ class Run:
         )
         if checkpoint is not None and (checkpoint / "episode.safetensors").exists():
             load_checkpoint(checkpoint, {"episode": self.interactive})
-        self.measurements = Measurements(
+        self.evaluator = Evaluator(
             run=self.run,
             directory=self.directory,
             demos=self.demos,
@@ -186,10 +186,10 @@ class Run:
         with self.interruption:
             try:
                 self.demos.verification.wait()
-                returns = self.measurements.final_returns()
+                returns = self.evaluator.final_returns()
                 self.callbacks("on_evaluation", self.counters.agent_steps, returns)
-                self.measurements.rank()
-                self.measurements.showcase()
+                self.evaluator.rank()
+                self.evaluator.sample_episodes()
             except Exception:
                 self.log.close()
                 raise
@@ -213,7 +213,7 @@ class Run:
             if not self._take_alignment_steps(interruption):
                 return False
         if self.counters.to_rank:
-            self.measurements.rank()
+            self.evaluator.rank()
             self.counters.to_rank = 0
             self._checkpoint()
         return True
@@ -286,10 +286,10 @@ class Run:
 
     def _evaluate_if_due(self) -> None:
         if self.counters.to_evaluate:
-            self.measurements.returns_on_the_way()
+            self.evaluator.returns_on_the_way()
             self.counters.to_evaluate = 0
-            if self.measurements.newest:
-                self._tell("on_evaluation", self.counters.agent_steps, self.measurements.newest)
+            if self.evaluator.newest:
+                self._tell("on_evaluation", self.counters.agent_steps, self.evaluator.newest)
 
     def _interact(self, interruption: Interruption) -> bool:
         counters = self.counters
@@ -352,7 +352,7 @@ class Run:
 
     def _shown(self) -> dict[str, float]:
         """What stands beside the progress bar."""
-        short = {name.removeprefix("evaluation/"): value for name, value in self.measurements.newest.items()}
+        short = {name.removeprefix("evaluation/"): value for name, value in self.evaluator.newest.items()}
         return {"agent_steps": self.counters.agent_steps, **short}
 
     def _resume(self) -> Path | None:
