@@ -61,6 +61,7 @@ test-matrix: .venv/complete
 
 bench: .venv/complete
 	$(BIN)/python -m benchmarks.engine
+	$(BIN)/python -m benchmarks.states
 
 clean:
 	rm -rf .venv demo
