@@ -92,10 +92,9 @@ def doctor() -> int:
 
 
 def _show_pictures(console: Console, task: str) -> None:
-    """Raises:
-    BootifolError: pictures of the task cannot be rendered here.
-    """
-    profiles = {_DRAWN_TASK: ("fast",)}.get(task, get_args(RenderProfile))
+    profiles: tuple[RenderProfile, ...] = get_args(RenderProfile)
+    if task == _DRAWN_TASK:  # drawn by numpy, alike in every profile
+        profiles = profiles[:1]
     table = Table(
         "render profile",
         "ms an agent step",
