@@ -8,7 +8,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from bootifol.reports.run_files import RunFiles, find_runs, read_run
+from bootifol.reports.collection import read_runs
+from bootifol.reports.run_files import RunFiles
 from bootifol.reports.style import save_png
 
 Draw = Callable[[list[RunFiles], argparse.Namespace], tuple[Figure, Sequence[str]]]
@@ -34,7 +35,7 @@ def write_figure(parser: argparse.ArgumentParser, draw: Draw, arguments: Sequenc
         BootifolError: there are no such runs, or the figure cannot be drawn from them.
     """
     parsed = parser.parse_args(arguments)
-    figure, notes = draw([read_run(run_dir) for run_dir in find_runs(parsed.runs)], parsed)
+    figure, notes = draw(read_runs(parsed.runs), parsed)
     save_png(figure, parsed.out)
     for note in notes:
         print(f"- {note}")
