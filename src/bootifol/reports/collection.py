@@ -134,7 +134,10 @@ def add_to_collection(
             raise BootifolError(f"no run has logged {metric}; choose of {', '.join(names) or 'none'}")
     for name, run in runs.items():
         if not run.evaluations:
-            raise BootifolError(f"{run.path} has no evaluation to keep: {' '.join(run.notes)}")
+            told = " ".join(note for note in run.notes if note.startswith(EVALUATIONS))
+            raise BootifolError(
+                f"{run.path} has no evaluation to keep; let it learn until its first one. {told}"
+            )
         config = read_json(
             run.path / "config.json", f"the configuration of the run {run.path}", editable=True
         )
