@@ -31,12 +31,7 @@ def collection(shared_run: Path, tmp_path: Path) -> Path:
 def kept(run: RunFiles) -> dict[str, object]:
     """The fields that a collection keeps of every run."""
     fields = (field.name for field in dataclasses.fields(run) if field.name not in NOT_KEPT)
-    return {
-        name: {phase: list(span) for phase, span in run.phase_seconds.items()}
-        if name == "phase_seconds"
-        else getattr(run, name)
-        for name in fields
-    }
+    return {name: getattr(run, name) for name in fields}
 
 
 def test_a_run_of_a_collection_is_the_run(shared_run: Path, collection: Path, tmp_path: Path) -> None:
@@ -126,6 +121,10 @@ def test_what_cannot_be_kept_is_refused_and_nothing_changes(collection: Path, tm
     new = write_run(tmp_path / "new")
     with pytest.raises(BootifolError, match="no run has logged loss/none; choose of agent/q"):
         add_to_collection(collection, {"new": new}, metrics=["loss/none"])
+    with pytest.raises(BootifolError, match="new is the directory of a run"):
+        add_to_collection(new, {"new": new})
+    with pytest.raises(BootifolError, match=r"'\.\./new' is no name for a run"):
+        add_to_collection(collection, {"../new": new})
     (new / "evaluations.csv").unlink()
     with pytest.raises(BootifolError, match=r"new has no evaluation to keep; .* evaluations\.csv is missing"):
         add_to_collection(collection, {"new": new})

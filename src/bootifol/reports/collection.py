@@ -98,7 +98,7 @@ def read_collection(path: Path) -> list[RunFiles]:
             path / RUNS,
             list(notes),
             curves=_curves(metrics.get(name, [])),
-            phase_seconds=kept["phase_seconds"],
+            phase_seconds={phase: (first, last) for phase, (first, last) in kept["phase_seconds"].items()},
             evaluations=evaluations.get(name, []),
             ranking=ranking.get(name, []),
             agent_steps=kept["agent_steps"],
@@ -121,28 +121,31 @@ def add_to_collection(
         ranking: whether the rankings of held-out videos are kept.
 
     Raises:
-        BootifolError: a run has no evaluation or the collection is damaged; or no run has logged one of the metrics.
+        BootifolError: a run has no evaluation, no run has logged one of the metrics, the collection is damaged, or
+            its directory is a run's.
     """
+    if is_run(path):
+        raise BootifolError(f"{path} is the directory of a run: choose another one for the collection")
     kept = _read_list(path) if is_collection(path) else {}
     evaluations = _to_change(path / EVALUATIONS, EvaluationRow)
     rankings = _to_change(path / RANKING, RankingRow)
     logged = _to_change(path / METRICS, MetricRow)
-    runs = {name: read_run(run_dir) for name, run_dir in run_dirs.items()}
-    for metric in metrics:
-        if not any(metric == name for run in runs.values() for _, name in run.curves):
-            names = sorted({name for run in runs.values() for _, name in run.curves})
-            raise BootifolError(f"no run has logged {metric}; choose of {', '.join(names) or 'none'}")
-    for name, run in runs.items():
+    seen: set[str] = set()
+    for name, run_dir in run_dirs.items():
+        if not _is_name(name):
+            raise BootifolError(
+                f"{shortened(name)} is no name for a run in a collection: rename the directory"
+            )
+        run = read_run(run_dir)
         if not run.evaluations:
             told = " ".join(note for note in run.notes if note.startswith(EVALUATIONS))
             raise BootifolError(
-                f"{run.path} has no evaluation to keep; let it learn until its first one. {told}"
+                f"{run_dir} has no evaluation to keep; let it learn until its first one. {told}"
             )
-        config = read_json(
-            run.path / "config.json", f"the configuration of the run {run.path}", editable=True
-        )
         kept[name] = {
-            "config.json": config,
+            "config.json": read_json(
+                run_dir / "config.json", f"the configuration of {run_dir}", editable=True
+            ),
             "agent_steps": run.agent_steps,
             "phase_seconds": dict(run.phase_seconds),
         }
@@ -154,6 +157,11 @@ def add_to_collection(
             if metric in metrics
             for step, value in zip(curve.steps, curve.values, strict=True)
         ]
+        seen |= {metric for _, metric in run.curves}
+    if missing := [metric for metric in metrics if metric not in seen]:
+        raise BootifolError(
+            f"no run has logged {', '.join(missing)}; choose of {', '.join(sorted(seen)) or 'none'}"
+        )
     names = sorted(kept, key=lambda name: PurePosixPath(name).parts)
     _write(path / EVALUATIONS, EvaluationRow, evaluations, names)
     _write(path / RANKING, RankingRow, rankings, names)
@@ -178,8 +186,7 @@ def _read_list(path: Path) -> dict[str, Any]:
     if not isinstance(kept, dict):
         raise BootifolError(f"{path / RUNS} is damaged: it is no list of runs; {_MEND}")
     for name, run in kept.items():
-        place = PurePosixPath(name)
-        if not name.isprintable() or not place.parts or place.is_absolute() or ".." in place.parts:
+        if not _is_name(name):
             raise BootifolError(f"{path / RUNS} is damaged: {shortened(name)} is no name of a run; {_MEND}")
         if not isinstance(run, dict) or not _is_record(run):
             raise BootifolError(f"{path / RUNS} is damaged: it does not tell how far {name} came; {_MEND}")
@@ -187,6 +194,12 @@ def _read_list(path: Path) -> dict[str, Any]:
 
 
 _MEND = "bring it back from where it was copied, or remove it and collect the runs again"
+
+
+def _is_name(name: str) -> bool:
+    """Whether a run of this name lies in the collection and can be told by a path."""
+    place = PurePosixPath(name)
+    return name.isprintable() and bool(place.parts) and not place.is_absolute() and ".." not in place.parts
 
 
 def _is_record(run: dict[str, Any]) -> bool:

@@ -38,7 +38,7 @@ def table(paths: Sequence[AnyPath], out: AnyPath | None = None, tasks: Collectio
     """The paper's result tables from runs, as Markdown; written to a file on request.
 
     Args:
-        paths: run directories, or directories that hold some.
+        paths: run directories, collections of results, or directories that hold some.
         out: a file to write, as its name ends: .md, .tex or .csv.
         tasks: the only ones to show; None for all.
 
