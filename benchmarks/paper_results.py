@@ -182,7 +182,7 @@ def drawn(rows: Sequence[Row]) -> Figure:
         for column, (task,) in enumerate(tasks):
             axes[0, column].set_title(task_title(task), fontsize=9)
             axes[0, column].set_xlabel("thousand agent steps")
-            axes[1, column].set_xlabel("minutes of a core")
+            axes[1, column].set_xlabel("minutes of wall-clock")
             for panel in axes[:, column]:
                 panel.axhline(1.0, color="#7A7F87", linewidth=0.8)
         for line in range(2):
