@@ -28,9 +28,10 @@ from benchmarks.rows import Row, read_rows, write_rows
 from bootifol.errors import BootifolError
 from bootifol.evaluation.summary import summarize
 from bootifol.files import read_json, written_aside
+from bootifol.reports.collection import read_runs
 from bootifol.reports.markdown import markdown_table
 from bootifol.reports.names import task_title
-from bootifol.reports.run_files import RunFiles, find_runs, read_run
+from bootifol.reports.run_files import RunFiles
 from bootifol.reports.style import RUN_COLORS, RUN_DASHES, house_style, require_png, save_png
 
 KEY = ("task", "system", "cloned", "seed")
@@ -91,15 +92,14 @@ def keep(paths: Sequence[Path], out: Path) -> list[Row]:
     if out.with_suffix(".json").is_file():
         origins = dict(read_json(out.with_suffix(".json"), "how the runs were made"))
     seen: dict[tuple[str, ...], Path] = {}
-    for path in find_runs(paths):
-        run = read_run(path)
+    for run in read_runs(paths):
         new = rows_of(run)
         key = tuple(new[0][column] for column in KEY)
         if key in seen:
             raise BootifolError(
-                f"{path} and {seen[key]} are both {' '.join(key)}: give one of them, or keep them in two files"
+                f"{run.path} and {seen[key]} are both {' '.join(key)}: give one of them, or keep them in two files"
             )
-        seen[key] = path
+        seen[key] = run.path
         rows = [row for row in rows if tuple(row[column] for column in KEY) != key] + new
         origins["/".join(key)] = made_by(run)
     rows.sort(
