@@ -5,7 +5,7 @@
 
 The run's policy plays, half of the episodes with noise on its actions, and each of its steps is judged twice: by the
 environment, which alone says what a success is, and by the learned reward. The first row is the head that the run ended
-with. Then the same eyes get a head that learns on, from the run's own agent videos, with other numbers of FrameConfig.
+with. Then the same eyes get new heads, which learn from the run's own agent videos, with other numbers of FrameConfig.
 
 Only steps after half of a video's length count. One is a success where the environment gives at least 0.8 of what it
 gives the expert there, and a failure below half of that. Columns: mean learned reward of the expert's late frames, of
@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -39,13 +40,14 @@ from bootifol.experts import make_expert
 from bootifol.progress import progress
 from bootifol.replay.agent_videos import AgentVideos
 from bootifol.reports.markdown import markdown_table
+from bootifol.rewards.bootifol.frames.config import FrameConfig
 from bootifol.rewards.bootifol.frames.model import FrameRewardModel
 from bootifol.tasks import make_environment
 from bootifol.training.build import build_reward_model
 from bootifol.training.checkpoint import load_checkpoint
 from bootifol.training.run_config import RunConfig
 from bootifol.training.saved_policy import require_checkpoint, restored_agent
-from bootifol.types import Action, FrameStates, Observation, Rewards
+from bootifol.types import Action, Arrays, FrameStates, Observation, Rewards
 
 COLUMNS = (
     "task",
@@ -164,14 +166,23 @@ def late_frames(model: FrameRewardModel, expert: DemoSet, videos: int = 50) -> F
     return np.concatenate([model.states(of_video[len(of_video) // 2 :]) for of_video in frames])
 
 
+def with_new_head(config: FrameConfig, run: RunConfig, state: Arrays) -> FrameRewardModel:
+    """A reward model with the run's eyes, from its `state`, and a head that has learned nothing."""
+    model = FrameRewardModel(config, run.training.pictures.video_size, run.seed)
+    new = deepcopy(model.networks.head.state_dict())
+    model.load_state({name: array.copy() for name, array in state.items()})
+    model.networks.head.load_state_dict(new)
+    return model
+
+
 @command()
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("run", type=Path, help="directory of a run whose reward sees single frames")
-    parser.add_argument("--head", action="append", default=[], help="NAME=NUMBER,…: a head that learns on so")
-    parser.add_argument("--updates", type=int, default=2000, help="of each such head")
+    parser.add_argument("--head", action="append", default=[], help="NAME=NUMBER,…: a new head with these")
+    parser.add_argument("--updates", type=int, default=3000, help="of each such head")
     parser.add_argument("--episodes", type=int, default=12, help="that the policy plays")
     parser.add_argument("--steps", type=int, default=240, help="of each episode")
     parser.add_argument("--out", type=Path, required=True, help="CSV to write rows into")
@@ -199,8 +210,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     named = [("as the run left it", figures(model, played, late))]
     kept = {name: array.copy() for name, array in model.state().items()}
     for head, config in zip(options.head, configs, strict=True):
-        other = FrameRewardModel(config, run.training.pictures.video_size, run.seed)
-        other.load_state({name: array.copy() for name, array in kept.items()})
+        other = with_new_head(config, run, kept)
         with progress(f"a head with {head}", options.updates) as advance:
             for _ in range(options.updates):
                 other.update(expert, ring)
