@@ -26,7 +26,7 @@ from bootifol.training.build import build_reward_model
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.run_config import RunConfig
-from bootifol.types import Video
+from bootifol.types import StepMetrics, Video
 
 METHOD = "optimal_transport:OptimalTransport"
 TINY = [
@@ -149,10 +149,10 @@ def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
 ) -> None:
     play = InteractivePhase.play_episode
 
-    def play_and_stop(self: InteractivePhase) -> None:
+    def play_and_stop(self: InteractivePhase) -> list[StepMetrics]:
         if self.counters.episodes == 2:
             os.kill(os.getpid(), signal.SIGTERM)
-        play(self)
+        return play(self)
 
     with monkeypatch.context() as patch:
         patch.setattr(InteractivePhase, "play_episode", play_and_stop)
