@@ -20,8 +20,9 @@ from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.files import read_arrays
 from bootifol.rewards.base import RewardModel
+from bootifol.rewards.config import RewardConfig
 from bootifol.rewards.references import draw_references
-from bootifol.rewards.registry import RewardConfig, check_method, make_reward_model
+from bootifol.rewards.registry import check_method, make_reward_model
 from bootifol.training.build import build_reward_model
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.interactive import InteractivePhase

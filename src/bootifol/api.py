@@ -10,9 +10,9 @@ from typing import Any
 
 from rich.console import Console
 
-from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.import_videos import LARGEST_SQUARE, read_recordings
-from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
+from bootifol.demos.manifest import MANIFEST_NAME, find_demo_sets, read_manifest
 from bootifol.demos.match_set import match_of
 from bootifol.envs.rollout import PlayedEpisode
 from bootifol.errors import (

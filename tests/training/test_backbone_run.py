@@ -15,7 +15,7 @@ from tiny_runs import TINY, WITH_DEMONSTRATIONS, new_run, resumed
 from bootifol import api
 from bootifol.evaluation.tables import read_ranking
 from bootifol.networks.backbones import Backbone
-from bootifol.rewards.registry import RewardConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.training.config import TrainingConfig
 from bootifol.training.interactive import InteractivePhase
 from bootifol.types import Features, Frames, StepMetrics

@@ -10,7 +10,7 @@ from tiny_runs import SEEING, TINY, new_run
 
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import read_ranking
-from bootifol.rewards.registry import RewardConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.types import Video
 
 

@@ -15,7 +15,7 @@ from bootifol import api
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
-from bootifol.rewards.registry import RewardConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.training.build import build_agent, build_reward_model
 from bootifol.training.run_config import RunConfig
 from bootifol.training.trainer import Trainer

@@ -24,7 +24,8 @@ from bootifol.training.cloning import (
     one_cycle,
     steps_of_a_phase,
 )
-from bootifol.training.inferred_demonstrations import DemonstrationConfig, Demonstrations
+from bootifol.training.config import DemonstrationConfig
+from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.types import Arrays, Batch, Episode, FrameBatch, Frames, Metrics, Video, VideoSource
 
 SIZE, STEPS, MOVES = 32, 12, 4

@@ -12,9 +12,9 @@ from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.presets import SMOKE
 from bootifol.rewards.bootifol.frames.config import FrameConfig
-from bootifol.rewards.registry import METHODS, RewardConfig
-from bootifol.training.config import AlignmentConfig, InteractiveConfig, TrainingConfig
-from bootifol.training.inferred_demonstrations import DemonstrationConfig
+from bootifol.rewards.config import RewardConfig
+from bootifol.rewards.registry import METHODS
+from bootifol.training.config import AlignmentConfig, DemonstrationConfig, InteractiveConfig, TrainingConfig
 from bootifol.training.run_config import RunConfig
 from bootifol.training.trainer import Trainer
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from rich.console import Console
 
 from bootifol.demos.augmentation import AugmentationConfig, augmented
-from bootifol.demos.check import differences
-from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.features import FeaturizedVideos, without_pixels
-from bootifol.demos.manifest import read_manifest
+from bootifol.demos.fit import differences
+from bootifol.demos.manifest import find_demo_sets, read_manifest
 from bootifol.demos.record import record
 from bootifol.demos.verification import Verification
 from bootifol.errors import BootifolError
