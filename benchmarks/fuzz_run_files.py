@@ -1,4 +1,4 @@
-"""Configurations, manifests, metrics and checkpoint indices as nobody writes them, against everything that reads them.
+"""Configurations, manifests, metrics, collections and checkpoints as nobody writes them, against all that reads them.
 
     python -m benchmarks.fuzz_run_files --minutes 10
 
@@ -29,6 +29,8 @@ from benchmarks.command import command
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.manifest import find_demo_sets
 from bootifol.errors import BootifolError
+from bootifol.evaluation.tables import EvaluationRow, append_evaluations
+from bootifol.reports.collection import add_to_collection, read_runs
 from bootifol.reports.comparison import compare
 from bootifol.reports.findings import findings
 from bootifol.reports.run_files import flattened, read_run
@@ -105,6 +107,11 @@ def opened(run: Path, demos: Path) -> dict[str, Callable[[], object]]:
         compare([files, whole], unfinished=True)
         return findings(files), list(flattened(files.config)), files.agent_steps
 
+    def collection() -> object:
+        runs = read_runs([run.parent / "kept"])
+        compare([*runs, whole], unfinished=True)
+        return [(findings(files), list(flattened(files.config)), files.agent_steps) for files in runs]
+
     def index() -> object:
         newest = newest_checkpoint(run / "checkpoints")
         return None if newest is None else load_checkpoint(newest, {})
@@ -115,15 +122,22 @@ def opened(run: Path, demos: Path) -> dict[str, Callable[[], object]]:
     return {
         "config.json": configuration,
         "report": report,
+        "collection": collection,
         "checkpoint.json": index,
         "manifest.json": manifest,
     }
 
 
 def small_run(directory: Path) -> tuple[Path, Path]:
-    """A run of seconds and its videos."""
+    """A run of seconds and its videos; beside the run a collection, `kept`, that holds it."""
     demos = record_demos(directory / "demos")
     new_run(directory / "run", demos, config=ENDS_SOON).learn()
+    append_evaluations(
+        directory / "run" / "evaluations.csv", [EvaluationRow(1, 1.0, 60, 0, 7, 0.5, None, None)]
+    )
+    add_to_collection(
+        directory / "kept", {"run": directory / "run"}, ["episode/learned_reward"], ranking=True
+    )
     return directory / "run", demos
 
 
@@ -136,6 +150,7 @@ def files_of(run: Path, demos: Path) -> dict[str, Path]:
         "metrics.jsonl": run / "metrics.jsonl",
         "checkpoint.json": newest / "checkpoint.json",
         "manifest.json": demos / "expert" / "manifest.json",
+        "runs.json": run.parent / "kept" / "runs.json",
     }
 
 

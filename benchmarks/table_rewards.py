@@ -18,11 +18,11 @@ import numpy as np
 
 from benchmarks.command import command
 from bootifol.evaluation.tables import RankingRow
+from bootifol.reports.collection import read_runs
 from bootifol.reports.comparison import Group, compare
 from bootifol.reports.findings import scores_or_none
 from bootifol.reports.markdown import markdown_table
 from bootifol.reports.names import task_title
-from bootifol.reports.run_files import find_runs, read_run
 
 HEADER = (
     *(
@@ -103,7 +103,7 @@ def main(words: Sequence[str] | None = None) -> None:
         "runs", nargs="+", type=Path, metavar="RUN", help="directories of runs, or that hold some"
     )
     arguments = parser.parse_args(words)
-    comparison = compare([read_run(directory) for directory in find_runs(arguments.runs)])
+    comparison = compare(read_runs(arguments.runs))
     print(markdown_table(HEADER, [rows_of(group) for group in comparison.groups]))
     for note in comparison.notes:
         print(f"\n- {note}")

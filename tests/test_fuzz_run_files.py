@@ -17,7 +17,9 @@ def run_and_demos(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]
     return small_run(tmp_path_factory.mktemp("fuzzed"))
 
 
-@pytest.mark.parametrize("name", ["config.json", "metrics.jsonl", "checkpoint.json", "manifest.json"])
+@pytest.mark.parametrize(
+    "name", ["config.json", "metrics.jsonl", "checkpoint.json", "manifest.json", "runs.json"]
+)
 def test_changed_files_are_read_or_refused_with_a_sentence(
     run_and_demos: tuple[Path, Path], name: str
 ) -> None:

@@ -1,4 +1,4 @@
-"""The ten lines of the README."""
+"""Every function of the library, from videos to a table."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bootifol.envs.pictures import PictureConfig
 from bootifol.presets import SMOKE
 
 
-def test_the_readmes_lines_run(tmp_path: Path) -> None:
+def test_the_functions_run_one_after_another(tmp_path: Path) -> None:
     from dataclasses import replace
 
     pictures = PictureConfig(agent_size=32, video_size=32)

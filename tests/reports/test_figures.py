@@ -1,4 +1,3 @@
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -8,19 +7,10 @@ from matplotlib.axes import Axes
 from PIL import Image
 from synthetic_run import AGENT_STEPS
 
-from benchmarks import (
-    figure_alignment,
-    figure_alignment_losses,
-    figure_demonstrations,
-    figure_encoder_training,
-    figure_encoding_based,
-    figure_metrics,
-    figure_returns,
-    figure_run,
-    figure_sequence_loss,
-)
+from benchmarks import figure as figures
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow, append_evaluations
+from bootifol.reports.collection import add_to_collection
 from bootifol.reports.comparison import Comparison, compare
 from bootifol.reports.figures import Loss, band_over_seeds, losses_figure, returns_figure
 from bootifol.reports.film_strip import expert_above_agent, run_figure
@@ -131,7 +121,7 @@ def test_a_loss_may_be_the_sum_of_two(tmp_path: Path) -> None:
 
 def test_a_run_without_the_loss_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run_dir = write_run(tmp_path / "a", method="gaifo", losses={"discriminator": [1.0, 1.0]})
-    assert figure_sequence_loss.main([str(run_dir), "--out", str(tmp_path / "figure.png")]) == 2
+    assert figures.main(["sequence-loss", str(run_dir), "--out", str(tmp_path / "figure.png")]) == 2
     told = capsys.readouterr().err
     assert f"{run_dir} has logged no loss/prediction in its Interactive Phase" in told
     assert not (tmp_path / "figure.png").exists()
@@ -159,36 +149,68 @@ def ablations(tmp_path: Path) -> Path:
     ("command", "runs", "labels"),
     [
         (
-            figure_alignment,
+            "alignment",
             ["all", "no-alignment", "to-the-end"],
             ["alignment", "no-alignment", "no-alignment, trained to the end"],
         ),
-        (figure_encoder_training, ["to-the-end", "no-alignment"], ["500-step", "1K-step"]),
-        (figure_encoding_based, ["all", "encodings"], ["image-based", "encoding-based"]),
-        (figure_returns, ["all"], ["BootIfOL"]),
-        (figure_alignment_losses, ["all"], ["BootIfOL"]),
-        (figure_sequence_loss, ["all"], ["BootIfOL"]),
+        ("encoder-training", ["to-the-end", "no-alignment"], ["500-step", "1K-step"]),
+        ("encoding-based", ["all", "encodings"], ["image-based", "encoding-based"]),
+        ("returns", ["all"], ["BootIfOL"]),
+        ("alignment-losses", ["all"], ["BootIfOL"]),
+        ("sequence-loss", ["all"], ["BootIfOL"]),
     ],
 )
 def test_every_figure_is_a_command(
-    command: object, runs: list[str], labels: list[str], ablations: Path, monkeypatch: pytest.MonkeyPatch
+    command: str, runs: list[str], labels: list[str], ablations: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn = []
-    monkeypatch.setattr("benchmarks.figure_command.save_png", lambda figure, out: drawn.append(figure))
-    arguments = [*(str(ablations / run) for run in runs), "--out", "figure.png"]
-    assert command.main(arguments) == 0  # type: ignore[attr-defined]
+    monkeypatch.setattr("benchmarks.figure.save_png", lambda figure, out: drawn.append(figure))
+    arguments = [command, *(str(ablations / run) for run in runs), "--out", "figure.png"]
+    assert figures.main(arguments) == 0
     assert [line.get_label() for line in drawn[0].axes[0].lines] == [f"{label}, 1 seed" for label in labels]
+
+
+def test_a_figure_of_a_collection_is_that_of_its_runs(
+    ablations: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs = {name: ablations / name for name in ("all", "encodings")}
+    add_to_collection(tmp_path / "kept", runs, metrics=["loss/prediction", "loss/sequence"])
+    drawn = []
+    monkeypatch.setattr("benchmarks.figure.save_png", lambda figure, out: drawn.append(figure))
+    kept = [str(tmp_path / "kept" / name) for name in runs]
+    for words in (
+        ["returns", "--by-time", "--scaled"],
+        ["encoding-based"],
+        ["metrics", "--metrics", "loss/sequence"],
+    ):
+        for paths in (map(str, runs.values()), kept):
+            assert figures.main([words[0], *paths, *words[1:], "--out", "figure.png"]) == 0
+        for of_runs, of_collection in zip(drawn[-2].axes, drawn[-1].axes, strict=True):
+            assert len(of_runs.lines) == len(of_collection.lines) > 0
+            for line in range(len(of_runs.lines)):
+                np.testing.assert_array_equal(points(of_runs, line), points(of_collection, line))
+    assert drawn[0].axes[0].get_xlabel() == "minutes of wall-clock time"
+    assert drawn[0].axes[0].get_ylabel() == "scaled return of 500-step episodes"
+
+
+def test_every_figure_is_on_the_page(capsys: pytest.CaptureFixture[str]) -> None:
+    pages = "".join(page.read_text() for page in (Path(__file__).parents[2] / "docs").rglob("*.md"))
+    assert [name for name in figures.FIGURES if f"benchmarks.figure {name}" not in pages] == []
+    with pytest.raises(SystemExit) as stopped:
+        figures.main(["reruns"])
+    assert stopped.value.code == 2
+    assert "Available subcommands: returns, alignment" in capsys.readouterr().err
 
 
 def test_a_figure_is_written_whole(
     ablations: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "docs" / "returns.png"
-    assert figure_returns.main([str(ablations / "all"), "--out", str(out)]) == 0
+    assert figures.main(["returns", str(ablations / "all"), "--out", str(out)]) == 0
     assert f"figure: {out}" in capsys.readouterr().out
     with Image.open(out) as picture:
         assert len(picture.convert("RGB").getcolors(maxcolors=1 << 22)) > 10
-    assert figure_returns.main([str(ablations / "all"), "--out", str(out.with_suffix(".bmp"))]) == 2
+    assert figures.main(["returns", str(ablations / "all"), "--out", str(out.with_suffix(".bmp"))]) == 2
     assert "ends in .png" in capsys.readouterr().err
     assert [path.name for path in out.parent.iterdir()] == ["returns.png"]
 
@@ -198,7 +220,7 @@ def test_a_random_policy_has_no_curve(
 ) -> None:
     random = write_run(tmp_path / "random", method="random", agent_steps=0)
     arguments = [str(random), str(ablations / "all"), "--out", str(tmp_path / "figure.png")]
-    assert figure_returns.main(arguments) == 0
+    assert figures.main(["returns", *arguments]) == 0
     assert f"{random} learns nothing, so it has no curve" in capsys.readouterr().out
 
 
@@ -206,13 +228,13 @@ def test_an_ablation_wants_two_variants_of_bootifol(
     ablations: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     one = [str(ablations / "all"), "--out", "figure.png"]
-    assert figure_alignment.main(one) == 2
+    assert figures.main(["alignment", *one]) == 2
     assert "all finished runs are of one variant, alignment: add one" in capsys.readouterr().err
     write_run(ablations / "cut", agent_steps=10, alignment__gradient_steps=0)
-    assert figure_alignment.main([str(ablations / "cut"), *one]) == 2
+    assert figures.main(["alignment", str(ablations / "cut"), *one]) == 2
     assert "cut (no-alignment on Reacher Hard) is unfinished" in capsys.readouterr().err
     other = write_run(ablations / "other", method="virl")
-    assert figure_alignment.main([str(other), *one]) == 2
+    assert figures.main(["alignment", str(other), *one]) == 2
     assert "is of the method virl, but the ablation is of bootifol" in capsys.readouterr().err
 
 
@@ -239,19 +261,19 @@ def test_a_run_on_a_page(shared_run: Path, tmp_path: Path, capsys: pytest.Captur
         np.testing.assert_array_equal(np.asarray(axes.images[0].get_array()), video.frames[3])
         np.testing.assert_array_equal(np.asarray(line.get_ydata()), video.rewards)
     out = tmp_path / "docs" / "run.png"
-    assert figure_run.main([str(shared_run), "--out", str(out)]) == 0
+    assert figures.main(["run", str(shared_run), "--out", str(out)]) == 0
     with Image.open(out) as picture:
         assert picture.width == 1560
     two = [str(shared_run), str(write_run(tmp_path / "a")), "--out", str(out)]
-    assert figure_run.main(two) == 2
+    assert figures.main(["run", *two]) == 2
     assert "the figure shows one run, and there are 2" in capsys.readouterr().err
-    assert figure_run.main(two[1:]) == 2
+    assert figures.main(["run", *two[1:]]) == 2
     assert "a has no films from start 0 to draw" in capsys.readouterr().err
 
 
 def test_a_run_without_films_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run_dir = write_run(tmp_path / "a")
-    assert figure_demonstrations.main([str(run_dir), "--out", str(tmp_path / "figure.png")]) == 2
+    assert figures.main(["demonstrations", str(run_dir), "--out", str(tmp_path / "figure.png")]) == 2
     assert f"{run_dir} has no film of expert and agent from start 0" in capsys.readouterr().err
 
 
@@ -261,11 +283,11 @@ def test_any_metric_has_a_panel_and_every_run_a_line(
     write_run(tmp_path / "a", seed=1, curve=CURVE, losses={"total": [3.0, 2.0]})
     write_run(tmp_path / "b", seed=2, curve=CURVE, losses={"total": [5.0, 1.0], "extra": [1.0]})
     runs = [read_run(tmp_path / name) for name in "ab"]
-    figure, notes = figure_metrics.draw(runs, argparse.Namespace(metrics=["loss/total", "loss/extra"]))
+    figure, notes = figures.metrics_figure(runs, ["loss/total", "loss/extra"])
     assert notes == [f"{tmp_path / 'a'} has not logged loss/extra"]
     _, total, extra = figure.axes
     assert [points(total, line)[:, 1].tolist() for line in range(2)] == [[3.0, 2.0], [5.0, 1.0]]
     assert len(extra.lines) == 1
     words = [str(tmp_path), "--metrics", "loss/none", "--out", str(tmp_path / "x.png")]
-    assert figure_metrics.main(words) == 2
+    assert figures.main(["metrics", *words]) == 2
     assert "no run has logged loss/none; choose of" in capsys.readouterr().err

@@ -48,6 +48,33 @@ def test_contrast_of_groups_is_the_mean_over_groups() -> None:
     assert float(losses.contrast(u, v, 0.1)) == pytest.approx(sum(by_group) / 3, rel=1e-5)
 
 
+def test_exchanged_states_join_the_halves_that_they_should() -> None:
+    """A state here is (u, v) = (10 * video + moment, the same), and videos of chance are 7 and 8."""
+    expert = torch.tensor([[[10.0, 10.0], [11.0, 11.0]], [[20.0, 20.0], [21.0, 21.0]]])
+    random = torch.tensor([[[70.0, 70.0], [71.0, 71.0]], [[80.0, 80.0], [81.0, 81.0]]])
+    same, mixed = losses.exchanged(expert, expert.roll(1, 1), random)
+    assert same.tolist() == [[[11, 10], [10, 11]], [[21, 20], [20, 21]]], "two moments of one video"
+    assert mixed.reshape(-1, 2).tolist() == [
+        *([21, 10], [20, 11], [11, 20], [10, 21]),  # both the expert's
+        *([21, 70], [20, 71], [11, 80], [10, 81]),  # a random v with the expert's u
+        *([70, 10], [71, 11], [80, 20], [81, 21]),  # a random u with the expert's v
+    ]
+
+
+def test_exchanged_states_do_without_random_videos() -> None:
+    expert = torch.tensor([[10.0, 10.0], [20.0, 20.0]])
+    _, mixed = losses.exchanged(expert, expert, torch.empty(0, 2))
+    assert mixed.tolist() == [[20, 10], [10, 20]]
+
+
+def test_exchange_loss_is_half_of_both_cross_entropies() -> None:
+    same, mixed = torch.tensor([math.log(3)]), torch.tensor([0.0, math.log(3)])
+    of_same = 0.25 * math.log(4 / 3) + 0.75 * math.log(4)
+    of_mixed = (math.log(2) + math.log(4)) / 2
+    found = float(losses.exchange_loss(same, torch.tensor([0.25]), mixed))
+    assert found == pytest.approx((of_same + of_mixed) / 2)
+
+
 @pytest.mark.parametrize(
     ("of_expert", "of_agent", "least"), [(0.2, 0.8, 0.25), (0.5, 0.5, 1.0), (0.6, 0.3, 1.0)]
 )

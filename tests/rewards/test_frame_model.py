@@ -117,9 +117,24 @@ def test_the_agents_failures_lose_and_eyes_rest() -> None:
     assert set(metrics) == {"loss/frame", "loss/bootstrap", "loss/total"}
 
 
-def test_it_goes_on_bit_for_bit_from_what_it_stored() -> None:
-    whole = aligned(6)
-    rest = FrameRewardModel(SMALL, SIZE, seed=5)
+def test_a_v_that_goes_with_another_u_loses() -> None:
+    """What the videos do not show: the dot at rest where another video's target is."""
+    model = aligned(60, replace(SMALL, exchange_weight=1.0))
+    ring = agents_videos(model, Reaches("hole", False, 16, seed=11))
+    for _ in range(100):
+        metrics = model.update(EXPERT, ring)
+    assert set(metrics) == {"loss/frame", "loss/bootstrap", "loss/exchange", "loss/total"}
+    last = np.stack([model.states(EXPERT[i].frames[-1:])[0] for i in range(32)])
+    u, v = np.split(last, 2, axis=1)
+    right, wrong = model.score(last), model.score(np.concatenate([np.roll(u, 1, 0), v], axis=1))
+    assert np.mean(right[:, None] > wrong[None]) > 0.82
+
+
+@pytest.mark.parametrize("exchange_weight", [0.0, 1.0])
+def test_it_goes_on_bit_for_bit_from_what_it_stored(exchange_weight: float) -> None:
+    config = replace(SMALL, exchange_weight=exchange_weight)
+    whole = aligned(6, config)
+    rest = FrameRewardModel(config, SIZE, seed=5)
     rest.load_state({name: array.copy() for name, array in whole.state().items()})
     ring = agents_videos(whole, OTHER)
     for _ in range(3):

@@ -21,7 +21,7 @@ def table(runs: RunPaths, out: Path | None = None, tasks: Tasks = ()) -> int:
     copies) and what is not on equal terms (mixed configurations or versions, unequal budgets).
 
     Args:
-        runs: Directories that `bootifol train` wrote, or directories that hold some.
+        runs: Directories that `bootifol train` wrote, collections of results, or directories that hold some.
         out: A file to write besides; its ending says how: .md (Markdown), .tex (LaTeX) or .csv.
         tasks: The only ones to show, such as reacher_hard hopper_stand.
     """

@@ -1,14 +1,15 @@
 """The result tables of a run, `evaluations.csv` and `ranking.csv`, and the one of `bootifol evaluate --out`.
 
 Every write leaves a whole file (written aside, then renamed). Rows measured again at the same agent steps
-replace the old ones, so a run that resumes from a checkpoint repeats its evaluations without doubling them.
+replace the old ones, so a run that resumes from a checkpoint repeats its evaluations without doubling them. A table of
+many runs (`write_by_run`) has their names in a first column.
 """
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -71,14 +72,38 @@ class RankingRow:
     """The learned reward summed over the video."""
 
 
-Row = TypeVar("Row", EvaluationRow, RankingRow)
+@dataclass(frozen=True)
+class MetricRow:
+    """One value that a run logged."""
+
+    phase: str
+    """Of the run: alignment, cloning or interactive."""
+
+    step: int
+    """As the phase counts."""
+
+    name: str
+    """Of the metric."""
+
+    value: float
+
+
+RUN = "run"
+"""First column of a table of many runs."""
+
+Row = TypeVar("Row", EvaluationRow, RankingRow, MetricRow)
+
+Measured = TypeVar("Measured", EvaluationRow, RankingRow)
+"""Rows of one moment, which are measured and replaced together."""
+
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
-class Table(Generic[Row]):
+class Table(Generic[Item]):
     """What a table file holds."""
 
-    rows: list[Row]
+    rows: list[Item]
     damaged_lines: list[int]
     """Numbers of the lines (the header is 1) that could not be read, such as one cut by a crash."""
 
@@ -130,35 +155,67 @@ def read_ranking(path: Path) -> Table[RankingRow]:
     return _read(path, RankingRow)
 
 
-def _drop_later_rows(path: Path, row_type: type[Row], agent_steps: int) -> None:
+def write_by_run(path: Path, row_type: type[Row], rows: Sequence[tuple[str, Row]]) -> None:
+    """Writes the rows of many runs, each with the name of its run, which becomes the first column `run`."""
+    _write_lines(path, [RUN, *_columns(row_type)], [_texts(row, name) for name, row in rows])
+
+
+def read_by_run(path: Path, row_type: type[Row]) -> Table[tuple[str, Row]]:
+    """Reads a table of `write_by_run`: each row with the name of its run.
+
+    Raises:
+        BootifolError: the file is missing, or its columns are others.
+    """
+    pairs: list[tuple[str, Row] | None] = []
+    for line in _read_lines(path, [RUN, *_columns(row_type)]):
+        row = _parsed(row_type, line[1:])
+        pairs.append(None if row is None else (line[0], row))
+    return _table(pairs)
+
+
+def _drop_later_rows(path: Path, row_type: type[Measured], agent_steps: int) -> None:
     rows = _rows_so_far(path, row_type)
     kept = [row for row in rows if row.agent_steps <= agent_steps]
     if len(kept) < len(rows):
         _write(path, row_type, kept)
 
 
-def _rows_so_far(path: Path, row_type: type[Row]) -> list[Row]:
+def _rows_so_far(path: Path, row_type: type[Measured]) -> list[Measured]:
     return _read(path, row_type).rows if path.exists() else []
 
 
-def _sorted(rows: Sequence[Row]) -> list[Row]:
+def _sorted(rows: Sequence[Measured]) -> list[Measured]:
     """By agent steps: a re-measured evaluation takes the place of the one it replaces."""
     return sorted(rows, key=lambda row: row.agent_steps)
 
 
 def _write(path: Path, row_type: type[Row], rows: Sequence[Row]) -> None:
+    _write_lines(path, _columns(row_type), map(_texts, rows))
+
+
+def _write_lines(path: Path, columns: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([field.name for field in fields(row_type)])
-    for row in rows:
-        writer.writerow(["" if value is None else str(value) for value in astuple(row)])
+    writer.writerow(columns)
+    writer.writerows(lines)
     with written_aside(path) as aside:
         aside.write_text(text.getvalue())
 
 
 def _read(path: Path, row_type: type[Row]) -> Table[Row]:
-    columns = [field.name for field in fields(row_type)]
-    readers = [_READERS[str(field.type)] for field in fields(row_type)]
+    return _table(_parsed(row_type, line) for line in _read_lines(path, _columns(row_type)))
+
+
+def _table(rows: Iterable[Item | None]) -> Table[Item]:
+    """Of rows, where None stands for a line that could not be read."""
+    numbered = list(enumerate(rows, start=2))
+    return Table(
+        [row for _, row in numbered if row is not None], [line for line, row in numbered if row is None]
+    )
+
+
+def _read_lines(path: Path, columns: Sequence[str]) -> list[list[str]]:
+    """The lines below the header, as texts."""
     try:
         require_file(path, "the table")
         lines = list(csv.reader(io.StringIO(path.read_text())))
@@ -171,14 +228,24 @@ def _read(path: Path, row_type: type[Row]) -> Table[Row]:
             f"{path} is not a table of this program: its first line must be {','.join(columns)}; "
             "move the file away to start a new one"
         )
-    rows: list[Row] = []
-    damaged: list[int] = []
-    for number, line in enumerate(lines[1:], start=2):
-        try:
-            rows.append(row_type(*[read(text) for read, text in zip(readers, line, strict=True)]))
-        except ValueError:
-            damaged.append(number)
-    return Table(rows, damaged)
+    return lines[1:]
+
+
+def _columns(row_type: type[Row]) -> list[str]:
+    return [field.name for field in fields(row_type)]
+
+
+def _texts(row: EvaluationRow | RankingRow | MetricRow, *before: str) -> list[str]:
+    return [*before, *("" if value is None else str(value) for value in astuple(row))]
+
+
+def _parsed(row_type: type[Row], line: Sequence[str]) -> Row | None:
+    """None where the line is no such row."""
+    readers = [_READERS[str(field.type)] for field in fields(row_type)]
+    try:
+        return row_type(*[read(text) for read, text in zip(readers, line, strict=True)])
+    except ValueError:
+        return None
 
 
 def _truth(text: str) -> bool:

@@ -85,7 +85,7 @@ def compare(
     """Sorts runs into groups that may be averaged.
 
     Args:
-        runs: from `read_run`.
+        runs: from `read_runs`.
         agent: what a run is compared as, such as its method or the value of an ablated field.
         compared: names of configuration fields that are meant to differ between agents, such as
             `alignment.gradient_steps`; those of the reward methods always are.

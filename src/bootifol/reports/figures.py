@@ -115,7 +115,7 @@ def ablation_figure(
     """Returns of BootIfOL with and without one of its parts.
 
     Args:
-        runs: from `read_run`.
+        runs: from `read_runs`.
         variant: what a run is called in the figure.
         compared: the configuration fields that variants differ in.
         lacking: what to do if there is only one variant, for the error's sentence.

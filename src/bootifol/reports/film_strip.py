@@ -74,7 +74,7 @@ def expert_above_agent(runs: Sequence[RunFiles], start: int = 0) -> Figure:
     """Film strips of expert and agent from the same start, one pair a run, from the first picture to the last.
 
     Args:
-        runs: from `read_run`, with a showcase.
+        runs: from `read_runs`, with a showcase.
         start: which of the showcase's starts, from 0.
 
     Raises:

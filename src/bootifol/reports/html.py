@@ -18,6 +18,7 @@ from bootifol.evaluation.summary import Summary
 from bootifol.files import written_aside
 from bootifol.progress import duration
 from bootifol.reports import plots
+from bootifol.reports.collection import read_runs
 from bootifol.reports.comparison import compare
 from bootifol.reports.film_strip import SHOWN_KINDS, reward_above_film_strip, videos_of_start
 from bootifol.reports.final_return import FinalReturn, final_return
@@ -25,7 +26,7 @@ from bootifol.reports.findings import Finding, findings, scores_or_none, short_n
 from bootifol.reports.names import task_title
 from bootifol.reports.plots import RunLook, common_length, looks_of
 from bootifol.reports.result_tables import fixed_number
-from bootifol.reports.run_files import COUNTERS, RunFiles, find_runs, flattened, read_run
+from bootifol.reports.run_files import COUNTERS, RunFiles, flattened
 from bootifol.reports.style import KIND_COLORS, svg_data_uri, thousands
 from bootifol.types import AnyPath
 
@@ -168,7 +169,7 @@ def report(run_dirs: Sequence[AnyPath], out: AnyPath) -> Path:
         BootifolError: there is no run, or a directory is not one.
     """
     directories, target = [Path(run_dir) for run_dir in run_dirs], Path(out)
-    runs = [read_run(run_dir) for run_dir in find_runs(directories)]
+    runs = read_runs(directories)
     looks = looks_of(runs)
     page = _template_environment().get_template("page.html")
     html = page.render(

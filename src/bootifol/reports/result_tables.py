@@ -81,7 +81,7 @@ def result_tables(runs: Sequence[RunFiles], tasks: Collection[str] | None = None
     """The tables of the paper that the runs have a part in, and one of every task beyond the paper.
 
     Args:
-        runs: from `read_run`.
+        runs: from `read_runs`.
         tasks: the only ones to show; None for all.
 
     Raises:

@@ -11,13 +11,14 @@ import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bootifol.errors import BootifolError
-from bootifol.evaluation.tables import EvaluationRow, RankingRow, Row, Table, read_evaluations, read_ranking
+from bootifol.evaluation.tables import EvaluationRow, Item, RankingRow, Table, read_evaluations, read_ranking
 from bootifol.files import parsed_json, read_arrays, read_json
 from bootifol.types import Arrays, Frames
 
@@ -90,6 +91,9 @@ class RunFiles:
     seconds: float | None
     """Wall-clock seconds of training, by the last record that tells them."""
 
+    agent_steps: int
+    """Agent steps of training, by the last record that counts them."""
+
     evaluations: Sequence[EvaluationRow]
     ranking: Sequence[RankingRow]
     showcase: Mapping[tuple[str, int], ShowcaseVideo]
@@ -105,14 +109,6 @@ class RunFiles:
     def label(self) -> str:
         """Short name of the run among others of its task."""
         return self.method if self.seed is None else f"{self.method}, seed {self.seed}"
-
-    @property
-    def agent_steps(self) -> int:
-        """Agent steps of training, by the last record that counts them."""
-        counted = [
-            int(c.steps[-1]) for (phase, _), c in self.curves.items() if phase == INTERACTIVE and len(c)
-        ]
-        return max([0, *counted, *(row.agent_steps for row in self.evaluations)])
 
     def curve(self, phase: str, name: str) -> Curve | None:
         """A metric, or None where nothing was recorded."""
@@ -170,10 +166,19 @@ class RunFiles:
         return grouped
 
 
-def find_runs(paths: Sequence[Path]) -> list[Path]:
+def is_run(path: Path) -> bool:
+    """Whether a directory is a run's."""
+    return (path / "config.json").is_file()
+
+
+def find_runs(paths: Sequence[Path], wanted: Callable[[Path], bool] = is_run) -> list[Path]:
     """The run directories among the paths and below them, each once, in the order given.
 
     What lies inside a run is passed over, so that a shell may expand `runs/**`.
+
+    Args:
+        paths: where to look.
+        wanted: what counts as a run.
 
     Raises:
         BootifolError: there are no paths, or one leads to no run.
@@ -182,12 +187,12 @@ def find_runs(paths: Sequence[Path]) -> list[Path]:
         raise BootifolError("there is no run; name the directory of one at least, or one that holds several")
     found: dict[Path, Path] = {}
     for path in paths:
-        if not path.exists():
+        if not path.exists() and not wanted(path):
             raise BootifolError(
                 f"there is no directory {path}; give directories that `train` wrote, or one that holds them"
             )
-        below = _runs_below(path, set())
-        if not below and not any(_is_run(parent) for parent in path.resolve().parents):
+        below = _runs_below(path, wanted, set())
+        if not below and not any(wanted(parent) for parent in path.resolve().parents):
             raise BootifolError(
                 f"there is no run in {path}; give directories that `train` wrote, or one that holds them"
             )
@@ -200,18 +205,14 @@ def find_runs(paths: Sequence[Path]) -> list[Path]:
     return list(found.values())
 
 
-def _runs_below(path: Path, seen: set[Path]) -> list[Path]:
+def _runs_below(path: Path, wanted: Callable[[Path], bool], seen: set[Path]) -> list[Path]:
     """Each directory is looked into once, for links may form circles."""
-    if _is_run(path):
+    if wanted(path):
         return [path]
     if not path.is_dir() or path.resolve() in seen:
         return []
     seen.add(path.resolve())
-    return [run_dir for child in sorted(path.iterdir()) for run_dir in _runs_below(child, seen)]
-
-
-def _is_run(path: Path) -> bool:
-    return (path / "config.json").is_file()
+    return [run_dir for child in sorted(path.iterdir()) for run_dir in _runs_below(child, wanted, seen)]
 
 
 def read_run(run_dir: Path) -> RunFiles:
@@ -224,23 +225,66 @@ def read_run(run_dir: Path) -> RunFiles:
         raise BootifolError(f"there is no run directory {run_dir}; give the directory that `train` wrote")
     config_path = run_dir / "config.json"
     header = read_json(config_path, f"the configuration of the run {run_dir}", editable=True)
-    if not isinstance(header, dict) or not isinstance(header.get("task"), str):
-        raise BootifolError(
-            f"{config_path} does not describe a run: it names no task; give the directory that `train` wrote"
-        )
     notes: list[str] = []
     curves, phase_seconds = _read_metrics(run_dir / "metrics.jsonl", notes)
-    evaluations = _read_table(run_dir / "evaluations.csv", read_evaluations, "evaluations", notes)
-    ranking = _read_table(run_dir / "ranking.csv", read_ranking, "ranking of held-out videos", notes)
-    showcase = _read_showcase(run_dir / "showcase.safetensors", notes)
-    video_files = _find_videos(run_dir / "videos", notes)
+    return described(
+        run_dir,
+        header,
+        config_path,
+        notes,
+        curves=curves,
+        phase_seconds=phase_seconds,
+        evaluations=read_table(run_dir / "evaluations.csv", read_evaluations, "evaluations", notes),
+        ranking=read_table(run_dir / "ranking.csv", read_ranking, "ranking of held-out videos", notes),
+        showcase=_read_showcase(run_dir / "showcase.safetensors", notes),
+        video_files=_find_videos(run_dir / "videos", notes),
+    )
+
+
+def described(
+    path: Path,
+    header: object,
+    header_path: Path,
+    notes: list[str],
+    *,
+    curves: Mapping[tuple[str, str], Curve],
+    phase_seconds: Mapping[str, tuple[float, float]],
+    evaluations: Sequence[EvaluationRow],
+    ranking: Sequence[RankingRow],
+    showcase: Mapping[tuple[str, int], ShowcaseVideo] = MappingProxyType({}),
+    video_files: Mapping[tuple[str, int], Path] = MappingProxyType({}),
+    agent_steps: int = 0,
+) -> RunFiles:
+    """A run by what its `config.json` says and what it measured.
+
+    Args:
+        path: the run's.
+        header: the content of its `config.json`.
+        header_path: the file that the header was read from.
+        notes: what is missing or damaged so far; what the header lacks is added.
+        curves: metrics by phase and name.
+        phase_seconds: the first and the last seconds of each phase.
+        evaluations: its evaluation episodes.
+        ranking: its ranked videos.
+        showcase: its episodes by kind and start.
+        video_files: its mp4 files by kind and start.
+        agent_steps: how far it is known to have learned, where curves and evaluations do not tell all.
+
+    Raises:
+        BootifolError: the header does not describe a run.
+    """
+    if not isinstance(header, dict) or not isinstance(header.get("task"), str):
+        raise BootifolError(
+            f"{header_path} does not describe a run: it names no task; give the directory that `train` wrote"
+        )
     seconds = [
         *(last for _, last in phase_seconds.values()),
         *(row.seconds for row in evaluations if _is_finite(row.seconds)),
     ]
+    counted = [int(c.steps[-1]) for (phase, _), c in curves.items() if phase == INTERACTIVE and len(c)]
     seed, time_budget = header.get("seed"), header.get("time_budget")
     return RunFiles(
-        path=run_dir,
+        path=path,
         task=header["task"],
         method=str(header.get("method", "unknown method")),
         preset=str(header.get("preset", "unknown preset")),
@@ -260,6 +304,7 @@ def read_run(run_dir: Path) -> RunFiles:
         curves=curves,
         phase_seconds=phase_seconds,
         seconds=max(seconds) if seconds else None,
+        agent_steps=max([agent_steps, *counted, *(row.agent_steps for row in evaluations)]),
         evaluations=evaluations,
         ranking=ranking,
         showcase=showcase,
@@ -374,7 +419,15 @@ def _is_finite(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
 
 
-def _read_table(path: Path, read: Callable[[Path], Table[Row]], what: str, notes: list[str]) -> list[Row]:
+def read_table(path: Path, read: Callable[[Path], Table[Item]], what: str, notes: list[str]) -> list[Item]:
+    """The rows of a table; what is missing or damaged becomes a note.
+
+    Args:
+        path: of the table.
+        read: how it is read.
+        what: what it holds, for the note.
+        notes: where the note is put.
+    """
     if not path.exists():
         notes.append(f"{path.name} is missing: no {what}.")
         return []

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
+from bootifol.reports.collection import read_runs
 from bootifol.reports.markdown import markdown_table
 from bootifol.reports.names import task_title
 from bootifol.reports.result_tables import (
@@ -19,7 +20,6 @@ from bootifol.reports.result_tables import (
     fixed_number,
     result_tables,
 )
-from bootifol.reports.run_files import find_runs, read_run
 from bootifol.types import AnyPath
 
 HEADER = ("Task", "Agent", "Seeds", "Episodes", "Mean [95 %]", "IQM [95 %]", "Paper")
@@ -38,7 +38,7 @@ def table(paths: Sequence[AnyPath], out: AnyPath | None = None, tasks: Collectio
     """The paper's result tables from runs, as Markdown; written to a file on request.
 
     Args:
-        paths: run directories, or directories that hold some.
+        paths: run directories, collections of results, or directories that hold some.
         out: a file to write, as its name ends: .md, .tex or .csv.
         tasks: the only ones to show; None for all.
 
@@ -53,9 +53,7 @@ def table(paths: Sequence[AnyPath], out: AnyPath | None = None, tasks: Collectio
         raise BootifolError(
             f"{target} is no name for a table: it must end in {', '.join(FORMATS)}, for Markdown, LaTeX or CSV"
         )
-    results = result_tables(
-        [read_run(run_dir) for run_dir in find_runs([Path(path) for path in paths])], tasks
-    )
+    results = result_tables(read_runs([Path(path) for path in paths]), tasks)
     if target is not None:
         with written_aside(target) as aside:
             aside.write_text(FORMATS[target.suffix](results))

@@ -26,6 +26,9 @@ class FrameConfig:
     time_weight: float = 0.5
     """Weight of L_T, which tells the moments of one video apart. 0 leaves it out."""
 
+    exchange_weight: float = 0.0
+    """Weight of L_X, which tells halves of one video's states from halves of two. 0 leaves it out."""
+
     agent_weight: float = 0.2
     """Weight of L_B, by which the agent's frames bootstrap the head in the Interactive Phase."""
 
@@ -71,7 +74,9 @@ class FrameConfig:
     def __post_init__(self) -> None:
         of_self = partial(fields_of, "frames", self)
         require_choices("frames", self)
-        require_at_least(0, **of_self("frame_weight", "episode_weight", "time_weight", "shift", "noise"))
+        require_at_least(
+            0, **of_self("frame_weight", "episode_weight", "time_weight", "exchange_weight", "shift", "noise")
+        )
         require_at_least(1, **of_self("frames_per_class", "width", "hidden_dim"))
         require_at_least(2, **of_self("videos_per_class", "moments"))
         require_positive(**of_self("temperature", "learning_rate", "head_learning_rate"))

@@ -39,6 +39,44 @@ def lateness(frame: torch.Tensor, frames: int, late_from: float) -> torch.Tensor
     return (frame / (late_from * (frames - 1))).clamp(max=1.0).float()
 
 
+def exchanged(
+    expert: torch.Tensor, another: torch.Tensor, random: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """States whose halves are of two frames, for L_X.
+
+    Args:
+        expert: `[N, ..., Z]` of expert frames; neighbors along N are of different videos.
+        another: `[N, ..., Z]` of other moments of the same videos.
+        random: `[M, ..., Z]` of random videos, at most N.
+
+    Returns:
+        The expert's v with the u of another moment of its video `[N, ..., Z]`, and u and v of two videos
+        `[N + 2 M, ..., Z]`: both the expert's, or one of them random.
+    """
+    (u, _), (_, v), (random_u, random_v) = (states.chunk(2, -1) for states in (another, expert, random))
+    elsewhere, count = u.roll(1, 0), len(random)
+    pairs = ((elsewhere, v), (elsewhere[:count], random_v), (random_u, v[:count]))
+    return torch.cat((u, v), -1), torch.cat([torch.cat(pair, -1) for pair in pairs])
+
+
+def exchange_loss(same: torch.Tensor, lateness: torch.Tensor, mixed: torch.Tensor) -> torch.Tensor:
+    """L_X: the halves of a state belong together where they are of one video, whatever its moments.
+
+    `L_X = -(E_same[ w log sigmoid(x) + (1 - w) log sigmoid(-x) ] + E_mixed[ log sigmoid(-x) ]) / 2`
+
+    u tells where an episode's goal is, v what the agent has done. An expert's v with another video's u has done what
+    was not asked for: a failure that no video shows. An expert's v with u of another moment has done it still. Without
+    such pairs a head with few videos learns by heart which v goes with which u.
+
+    Args:
+        same: logits `[N]` of v of expert frames with u of another moment of the same videos.
+        lateness: w `[N]` of the frames that v is of, in [0, 1].
+        mixed: logits `[M]` of u and v of two videos, one of them at least the expert's.
+    """
+    bce = F.binary_cross_entropy_with_logits
+    return (bce(same.float(), lateness) + F.softplus(mixed.float()).mean()) / 2
+
+
 def bootstrap_loss(agent: torch.Tensor) -> torch.Tensor:
     """L_B: the agent's frames that are not the expert's get less; those that are lose nothing.
 

@@ -62,15 +62,15 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
     def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
         """Alignment Phase: eyes and head learn from the expert's and random videos.
 
-        L = w_F L_F + w_E L_E + w_T L_T.
+        L = w_F L_F + w_E L_E + w_T L_T + w_X L_X.
         """
         self._other = other
         while True:
             yield self._align_step(expert, other)
 
     def update(self, expert: VideoSource, agent: VideoSource) -> Metrics:
-        """Interactive Phase: one gradient step of the head. L = L_F + w_B L_B, where L_F tells the expert's frames from
-        random ones and L_B bootstraps the head on the agent's.
+        """Interactive Phase: one gradient step of the head. L = L_F + w_X L_X + w_B L_B, where L_F tells the expert's
+        frames from random ones and L_B bootstraps the head on the agent's.
 
         Raises:
             BootifolError: the agent's videos have no states.
@@ -85,27 +85,35 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         videos = agent.sample_features(count - of_random, self._rng)
         rows = np.arange(len(videos))
         of_agent = videos[rows, self._rng.integers(videos.shape[1], size=len(videos))]
+        of_each = self._frames_of_each(expert, EXPERT_FRAMES)
         of_expert = self._rng.integers(len(self._expert), size=count)
         states = [
             self._expert[of_expert],
             of_agent,
             random[self._rng.integers(max(len(random), 1), size=of_random)],
         ]
+        if self.config.exchange_weight > 0:
+            moments = self._rng.integers(of_each, size=count)
+            states.append(self._expert[of_expert - of_expert % of_each + moments])
         features = as_features(self._on_device(np.concatenate(states)))
         features = features + self.config.noise * self._on_device(
             self._rng.standard_normal(features.shape, dtype=np.float32)
         )
         step = self._begin_step()
         self._optimizer.param_groups[0]["lr"] = self.config.head_learning_rate
-        logits = self.networks.logits(features)
-        ends = (count, 2 * count - of_random)
-        expert_logits, agent_logits, random_logits = torch.tensor_split(logits, ends)
-        of_each = self._frames_of_each(expert, EXPERT_FRAMES)
+        of_class = torch.tensor_split(features, (count, 2 * count - of_random, 2 * count))
+        expert_states, agent_states, random_states, another = of_class
+        logits = self.networks.logits
         lateness = losses.lateness(self._on_device(of_expert % of_each), of_each, self.config.late_from)
-        frame = losses.frame_loss(expert_logits, random_logits, lateness)
-        bootstrap = losses.bootstrap_loss(agent_logits)
+        frame = losses.frame_loss(logits(expert_states), logits(random_states), lateness)
+        bootstrap = losses.bootstrap_loss(logits(agent_states))
+        total = frame + self.config.agent_weight * bootstrap
         terms = {"loss/frame": frame, "loss/bootstrap": bootstrap}
-        metrics = step.take(frame + self.config.agent_weight * bootstrap, terms)
+        if self.config.exchange_weight > 0:
+            same, mixed = losses.exchanged(expert_states, another, random_states)
+            terms["loss/exchange"] = losses.exchange_loss(logits(same), lateness, logits(mixed))
+            total = total + self.config.exchange_weight * terms["loss/exchange"]
+        metrics = step.take(total, terms)
         self.version += 1
         return metrics
 
@@ -195,6 +203,12 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
             terms["episode"] = losses.contrast(moments, moments.roll(1, 0), config.temperature)
         if config.time_weight > 0:
             terms["time"] = losses.contrast(of_time[:, :, 0], of_time[:, :, 1], config.temperature)
+        if config.exchange_weight > 0:
+            of_expert_videos, of_random_videos = states.chunk(2)
+            another = of_expert_videos.roll(1, 1)
+            same, mixed = losses.exchanged(of_expert_videos, another, of_random_videos)
+            logits = self.networks.logits
+            terms["exchange"] = losses.exchange_loss(logits(same), lateness, logits(mixed))
         total = torch.stack([getattr(config, f"{name}_weight") * term for name, term in terms.items()]).sum()
         metrics = step.take(total, {f"loss/{name}": term for name, term in terms.items()})
         self.version += 1
