@@ -43,6 +43,7 @@ from bootifol.reports.markdown import markdown_table
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.run_directory import require_resumable, require_unused, writing_run
+from bootifol.types import StepMetrics
 
 CONFIG = replace(ENDS_SOON, tracker="tensorboard")
 COLUMNS = ("promise", "tries", "held")
@@ -255,10 +256,10 @@ def pipes_that_close(attack: Attack, tries: int) -> tuple[int, int]:
             os.close(reader)
             play = InteractivePhase.play_episode
 
-            def play_and_stop(self: InteractivePhase) -> None:
+            def play_and_stop(self: InteractivePhase) -> list[StepMetrics]:
                 if self.counters.episodes == episode:
                     os.kill(os.getpid(), sent)
-                play(self)
+                return play(self)
 
             InteractivePhase.play_episode = play_and_stop  # type: ignore[method-assign]
             return bootifol(["train", "--resume", str(run)])
@@ -363,11 +364,11 @@ def two_writers(attack: Attack, tries: int) -> tuple[int, int]:
         def first(run: Path = run, begins: int = begins) -> bool:
             play = InteractivePhase.play_episode
 
-            def play_and_tell(self: InteractivePhase) -> None:
+            def play_and_tell(self: InteractivePhase) -> list[StepMetrics]:
                 if not self.counters.episodes:
                     os.write(begins, b"1")
                     time.sleep(0.5)
-                play(self)
+                return play(self)
 
             InteractivePhase.play_episode = play_and_tell  # type: ignore[method-assign]
             return train(attack, run)

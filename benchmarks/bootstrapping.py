@@ -31,7 +31,8 @@ from scipy import stats
 from benchmarks.command import command
 from benchmarks.probe import with_fields
 from benchmarks.rows import Row, read_rows, write_rows
-from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.manifest import find_demo_sets
 from bootifol.envs.rollout import play_episode
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import area_under_curve

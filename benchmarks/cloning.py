@@ -28,8 +28,8 @@ from bootifol.progress import progress
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.tasks import make_environment, task_named
 from bootifol.training.cloning import one_cycle
-from bootifol.training.config import TrainingConfig
-from bootifol.training.inferred_demonstrations import DemonstrationConfig, Demonstrations
+from bootifol.training.config import DemonstrationConfig, TrainingConfig
+from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.training.interactive import episode_seed
 from bootifol.types import Episode, FrameBatch, Video
 

@@ -33,6 +33,7 @@ from benchmarks.process_memory import status_bytes
 from benchmarks.resumable_table import ResumableTable
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside
+from bootifol.networks.backbones import Backbone
 from bootifol.replay.agent_videos import AgentVideos
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.reports.markdown import markdown_table
@@ -43,7 +44,7 @@ from bootifol.training.alignment import alignment_phase
 from bootifol.training.cloning import cloning_phase
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 
 COLUMNS = {
     "task": "task",
@@ -177,14 +178,14 @@ def measured(planned: PlannedRun, steps: int) -> dict[str, str]:
         described = RunConfig(
             planned.task, planned.method, planned.preset, 1, str(planned.demos), None, shortened(config)
         )
-        run = Run(described, Path(temporary), Console(quiet=True))
+        run = Trainer(described, Path(temporary), Console(quiet=True))
         alignment = prepare(run)
         learning = seconds_per_1000(run, steps)
         resting = None
-        if not run.components.reward_model.keeps_learning:
+        if not run.parts.reward_model.keeps_learning:
             run.interactive.config = replace(run.interactive.config, reward_updates_until=0)
             resting = seconds_per_1000(run, steps)
-        reward, agent = run.components.reward_model, run.components.agent
+        reward, agent = run.parts.reward_model, run.parts.agent
         return {
             "task": planned.task,
             "preset": planned.preset,
@@ -219,15 +220,16 @@ def shortened(config: TrainingConfig) -> TrainingConfig:
     )
 
 
-def prepare(run: Run) -> float:
+def prepare(run: Trainer) -> float:
     """What comes before the phase that is measured: alignment, warm-up, cloning, and whatever compiles at first.
 
     Returns:
         Seconds of a gradient step of alignment, their median; 0 for a method that takes none.
     """
-    parts, counters = run.components, run.counters
+    parts, counters = run.parts, run.counters
     ends = [time.perf_counter()]
-    for _ in alignment_phase(parts.reward_model, run.demos.expert, run.demos.random, run.budget, counters):
+    expert, random = parts.demos.expert, parts.demos.random
+    for _ in alignment_phase(parts.reward_model, expert, random, run.budget, counters, log_every=1):
         ends.append(time.perf_counter())
     for _ in range(2):
         run.interactive.play_episode()
@@ -241,6 +243,7 @@ def prepare(run: Run) -> float:
                 run.rng,
                 run.budget,
                 counters,
+                log_every=1,
             ):
                 pass
     aligned = [end - start for start, end in pairwise(ends)][1:]
@@ -254,7 +257,7 @@ class Seconds(NamedTuple):
     cpu: float
 
 
-def seconds_per_1000(run: Run, agent_steps: int) -> Seconds:
+def seconds_per_1000(run: Trainer, agent_steps: int) -> Seconds:
     """The median of a few blocks of whole episodes, of so many agent steps each, after an episode that is not timed."""
     run.interactive.play_episode()
     blocks = []
@@ -271,21 +274,21 @@ def seconds_per_1000(run: Run, agent_steps: int) -> Seconds:
     return sorted(blocks)[BLOCKS // 2]
 
 
-def stores_when_full(planned: PlannedRun, run: Run) -> int:
+def stores_when_full(planned: PlannedRun, run: Trainer) -> int:
     """Bytes of the frames, or of their features, that a whole run of a sweep keeps; a short one fills few of them."""
     config = planned.config
     size, frames = config.pictures.agent_size, run.task.episode_steps + 1
     action_dim = run.interactive.environment.action_space.shape or (0,)
     replay = ReplayBuffer.bytes_needed(config.agent.replay_capacity, size, action_dim[0])
-    backbone = run.components.backbone
+    featurizer = run.parts.featurizer
     videos = AgentVideos.bytes_needed(
         config.interactive.agent_videos,
         frames,
         config.pictures.video_size,
-        backbone.feature_size if backbone else 0,
+        featurizer.feature_size if isinstance(featurizer, Backbone) else 0,
     )
     demonstrated = 0
-    if run.components.demonstrations is not None:
+    if run.parts.demonstrations is not None:
         count = min(config.demonstrations.videos, planned.videos or config.demonstrations.videos)
         demonstrated = ReplayBuffer.bytes_needed(count * frames, size, action_dim[0])
     return replay + videos + demonstrated

@@ -35,7 +35,7 @@ from bootifol.reports.style import house_style
 from bootifol.rewards.references import draw_references
 from bootifol.training.build import build_environment
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 from bootifol.types import Rewards, Video
 
 Performer = Callable[[int], Act]
@@ -91,24 +91,24 @@ def performers(task: str, environment: gymnasium.Env[Any, Any]) -> dict[str, Per
     }
 
 
-def judged(run: Run, episodes: int, agent_episodes: int) -> Iterator[Performance]:
+def judged(run: Trainer, episodes: int, agent_episodes: int) -> Iterator[Performance]:
     """Plays every performer, the agent last."""
-    environment = build_environment(run.run, run.task.episode_steps)
-    model, agent = run.components.reward_model, run.components.agent
+    environment = build_environment(run.config, run.task.episode_steps)
+    model, agent = run.parts.reward_model, run.parts.agent
     rng = np.random.default_rng(0)
     steps = run.budget.scheduled_steps(run.counters)
-    cast = performers(run.run.task, environment)
+    cast = performers(run.config.task, environment)
     cast["agent"] = lambda seed: lambda observation: agent.act(observation, steps, explore=False)
     for name, make in cast.items():
         for seed in range(agent_episodes if name == "agent" else episodes):
             played = play_episode(environment, make(seed), 10**6 + seed, f"{name}-{seed}")
-            rewards = model.label(played.episode.video, draw_references(model, run.demos.expert, rng))
+            rewards = model.label(played.episode.video, draw_references(model, run.parts.demos.expert, rng))
             yield Performance(name, played.environment_return, rewards)
 
 
-def staleness(run: Run, episodes: int) -> NDArray[np.float64]:
+def staleness(run: Trainer, episodes: int) -> NDArray[np.float64]:
     """Mean rewards a step `[n, 2]` of stored episodes of every age: as replay holds them, and as given now."""
-    replay, videos, model = run.components.replay, run.components.agent_videos, run.components.reward_model
+    replay, videos, model = run.parts.replay, run.parts.agent_videos, run.parts.reward_model
     rng = np.random.default_rng(0)
     stored = replay.state()
     both = min(len(videos), len(replay.episode_ids))
@@ -119,7 +119,7 @@ def staleness(run: Run, episodes: int) -> NDArray[np.float64]:
         steps = int(lengths[index])
         held = stored["rewards"][(starts[index] + np.arange(steps)) % replay.capacity].mean()
         video = Video(f"{newest[index].name}-now", newest[index].frames[: steps + 1])
-        pairs.append((held, model.label(video, draw_references(model, run.demos.expert, rng)).mean()))
+        pairs.append((held, model.label(video, draw_references(model, run.parts.demos.expert, rng)).mean()))
     return np.array(pairs, np.float64)
 
 
@@ -133,7 +133,7 @@ def main() -> None:
     parser.add_argument("--agent-episodes", type=int, default=40, help="of the agent")
     parser.add_argument("--out", type=Path, required=True, help="writes OUT.csv and OUT.png")
     arguments = parser.parse_args()
-    run = Run(RunConfig.read(arguments.run), arguments.run, Console(stderr=True))
+    run = Trainer(RunConfig.read(arguments.run), arguments.run, Console(stderr=True))
     performances: list[Performance] = []
     with progress("judging", total=9 * arguments.episodes + arguments.agent_episodes) as advance:
         for performance in judged(run, arguments.episodes, arguments.agent_episodes):

@@ -26,7 +26,8 @@ from hypothesis import strategies as st
 from tests.training.tiny_runs import ENDS_SOON, new_run, record_demos
 
 from benchmarks.command import command
-from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.manifest import find_demo_sets
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow, append_evaluations
 from bootifol.reports.collection import add_to_collection, read_runs

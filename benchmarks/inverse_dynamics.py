@@ -25,7 +25,7 @@ from bootifol.progress import progress
 from bootifol.training.build import build_environment
 from bootifol.training.inferred_demonstrations import moving_steps
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 
 SMALL = 0.3
 """Actions below this in every dimension are small: the expert approaches its goal or corrects."""
@@ -40,15 +40,15 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=60, help="of the bundled expert")
     arguments = parser.parse_args()
     console = Console()
-    run = Run(RunConfig.read(arguments.run), arguments.run, console)
-    demonstrations = run.components.demonstrations
+    run = Trainer(RunConfig.read(arguments.run), arguments.run, console)
+    demonstrations = run.parts.demonstrations
     if demonstrations is None:
         raise BootifolError(f"{arguments.run} has no demonstrations, so it inferred no actions")
-    environment = build_environment(run.run, run.task.episode_steps)
-    expert = make_expert(run.run.task, environment)
+    environment = build_environment(run.config, run.task.episode_steps)
+    expert = make_expert(run.config.task, environment)
     moving, errors, actions = [], [], []
     with progress("comparing with the expert's actions", arguments.episodes) as advance:
-        for seed in evaluation_seeds(run.run.seed, arguments.episodes):
+        for seed in evaluation_seeds(run.config.seed, arguments.episodes):
             episode = play_episode(environment, expert, seed, "expert").episode
             inferred = demonstrations.inverse_dynamics.actions(episode.frames)
             moving.append(moving_steps(episode.frames))

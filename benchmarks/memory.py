@@ -49,8 +49,10 @@ from bootifol.replay.agent_videos import AgentVideos
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.reports.markdown import markdown_table
 from bootifol.training.budget import Budget, Counters
-from bootifol.training.build import Components, build_components, build_environment, build_learners
+from bootifol.training.build import Parts, build_environment, build_parts
 from bootifol.training.interactive import InteractivePhase
+from bootifol.training.interruption import Interruption
+from bootifol.training.open_demos import Demos
 from bootifol.training.run_config import RunConfig
 from bootifol.types import Episode, FrameBatch, Video
 
@@ -147,17 +149,16 @@ def stores(run: RunConfig, action_dim: int) -> list[Reading]:
 
 def whole_process(run: RunConfig) -> int:
     """Bytes that a run's process took at most, its stores full and all of it at work; in a process of its own."""
-    config, frames = run.training, run.resolved_task().episode_steps + 1
+    config, task = run.training, run.resolved_task()
     torch.set_num_threads(config.threads)
     keep_freed_memory()
-    environment = build_environment(run, frames - 1)
+    frames = task.episode_steps + 1
     expert = PixelsOnDemand(config.demonstrations.videos, frames, config.pictures.video_size)
-    learners = build_learners(run, environment)
-    parts = build_components(run, environment, learners, expert, Console(stderr=True))
-    fill(parts.replay, frames, config.pictures.agent_size, actions_of(environment))
+    parts = build_parts(run, task, Console(stderr=True), Demos(expert, expert))
+    fill(parts.replay, frames, config.pictures.agent_size, actions_of(parts.environment))
     for index in range(config.interactive.agent_videos):
         parts.agent_videos.add(expert[index])
-    work(run, parts, environment, expert)
+    work(run, parts)
     return status_bytes("VmHWM")
 
 
@@ -184,11 +185,9 @@ def fill(replay: ReplayBuffer, frames: int, size: int, action_dim: int) -> None:
         replay.add(episode, rng.normal(size=frames - 1).astype(np.float32))
 
 
-def work(
-    run: RunConfig, parts: Components, environment: gymnasium.Env[Any, Any], expert: PixelsOnDemand
-) -> None:
+def work(run: RunConfig, parts: Parts) -> None:
     """Everything that learns, once at least."""
-    next(parts.reward_model.align(expert, expert))
+    next(parts.reward_model.align(parts.demos.expert, parts.demos.random))
     config = run.training
     counters = Counters(agent_steps=config.agent.warm_up_steps)
     budget = Budget(config.interactive.agent_steps)
@@ -199,18 +198,13 @@ def work(
         parts.demonstrations.infer(0, parts.reward_model, rng)
         parts.agent.clone(parts.demonstrations.sample(config.agent.batch_size, rng), learning_rate=1e-4)
     phase = InteractivePhase(
-        environment,
-        expert,
-        parts.agent_videos,
-        parts.replay,
-        parts.reward_model,
-        parts.agent,
-        parts.demonstrations,
+        parts,
         replace(config.interactive, reward_updates_until=config.interactive.agent_steps),
         budget,
         counters,
         run.seed,
         rng,
+        Interruption(),
     )
     for _ in range(2):
         phase.play_episode()

@@ -24,8 +24,8 @@ from rich.console import Console
 from torch import nn
 
 from benchmarks.command import command
-from bootifol.demos.demo_set import DemoSet, find_demo_sets
-from bootifol.demos.manifest import read_manifest
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.manifest import find_demo_sets, read_manifest
 from bootifol.envs.dm_control import DMControlSimulator
 from bootifol.envs.meta_world import MetaWorldSimulator
 from bootifol.envs.pictures import PictureConfig

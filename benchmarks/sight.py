@@ -21,7 +21,8 @@ import torch
 from rich.console import Console
 
 from benchmarks.command import command
-from bootifol.demos.demo_set import DemoSet, VideoSubset, find_demo_sets
+from bootifol.demos.demo_set import DemoSet, VideoSubset
+from bootifol.demos.manifest import find_demo_sets
 from bootifol.errors import BootifolError
 from bootifol.evaluation.sight import Performance, against_kinds, failures, perform, returns, sight
 from bootifol.files import written_aside

@@ -34,15 +34,15 @@ from rich.console import Console
 from benchmarks.command import command
 from benchmarks.engine import measured_rates, operations_of
 from bootifol.cli.train import preset_of
-from bootifol.demos.augmentation import augmented
+from bootifol.networks.backbones import Backbone
 from bootifol.progress import progress
 from bootifol.reports.markdown import markdown_table
 from bootifol.rewards.references import draw_references
 from bootifol.tracking import RunLog
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run
-from bootifol.types import Video, VideoSource
+from bootifol.training.trainer import Trainer
+from bootifol.types import Video
 
 HEADER = ("stage", "in a run", "ms each", "arithmetic ms", "ms an agent step", "share")
 
@@ -64,18 +64,14 @@ class Stage:
     """Takes seconds, and is timed once."""
 
 
-def stages_of(run: Run) -> Iterator[Stage]:
+def stages_of(run: Trainer) -> Iterator[Stage]:
     """Every stage of a run that has been warmed up, in the order of a run."""
-    config, parts, interactive = run.run.training, run.components, run.interactive
+    config, parts, interactive = run.config.training, run.parts, run.interactive
     steps, warm_up = config.interactive.agent_steps, config.agent.warm_up_steps
     acting, model, agent = steps - warm_up, parts.reward_model, parts.agent
     updates = acting / config.agent.update_every
 
-    expert, random, agent_videos = (
-        augmented(videos, run.demos.augmentation)
-        for videos in (run.demos.expert, run.demos.random, parts.agent_videos)
-    )
-    alignment = model.align(expert, random)
+    alignment = model.align(parts.demos.expert, parts.demos.random)
     if config.alignment.gradient_steps and next(alignment, None) is not None:
         yield Stage("alignment step", config.alignment.gradient_steps, functools.partial(next, alignment))
     if parts.demonstrations is not None:
@@ -110,13 +106,11 @@ def stages_of(run: Run) -> Iterator[Stage]:
 
     yield Stage("agent step of the environment", steps, step, computes=False)
     yield Stage("action of the agent", acting, lambda: agent.act(observation, 0, explore=True))
-    yield Stage(
-        "batch from replay", updates, lambda: interactive._batch(config.agent.batch_size), computes=False
-    )
-    batch = interactive._batch(config.agent.batch_size)
+    yield Stage("batch from replay", updates, interactive._batch, computes=False)
+    batch = interactive._batch()
     yield Stage("update of the agent", updates, lambda: agent.update(batch, 0))
     if not model.reads_environment_reward:
-        yield from reward_stages(run, expert, agent_videos)
+        yield from reward_stages(run)
     # One every so many agent steps, and one after every Cloning Phase.
     evaluations = steps // config.evaluation.every + (cloning_phases(config) if parts.demonstrations else 0)
     yield Stage(
@@ -131,10 +125,11 @@ def stages_of(run: Run) -> Iterator[Stage]:
     )
 
 
-def reward_stages(run: Run, expert: VideoSource, agent_videos: VideoSource) -> Iterator[Stage]:
+def reward_stages(run: Trainer) -> Iterator[Stage]:
     """What a learned reward does while the agent acts."""
-    config, parts, interactive = run.run.training, run.components, run.interactive
-    steps, model, length = config.interactive.agent_steps, run.components.reward_model, run.task.episode_steps
+    config, parts, interactive = run.config.training, run.parts, run.interactive
+    steps, model, length = config.interactive.agent_steps, parts.reward_model, run.task.episode_steps
+    expert, agent_videos = parts.demos.expert, interactive.shown_agent_videos
     until = steps if model.keeps_learning else min(config.interactive.reward_updates_until, steps)
     version = model.version
     model.update(expert, agent_videos)
@@ -147,11 +142,11 @@ def reward_stages(run: Run, expert: VideoSource, agent_videos: VideoSource) -> I
             renewed = updates * config.interactive.relabel_episodes
             yield Stage("renewing a stored episode's rewards", renewed, interactive._relabel_one)
     video, numbers = parts.agent_videos[0], itertools.count()
-    if parts.backbone is not None:
-        backbone, size = parts.backbone, config.pictures.video_size
+    if isinstance(parts.featurizer, Backbone):
+        backbone, size = parts.featurizer, config.pictures.video_size
         seen = Video("seen", np.zeros((length + 1, size, size, 3), np.uint8))
         yield Stage("features of an episode", steps / length, lambda: backbone.with_features(seen))
-    references = draw_references(model, run.demos.expert, run.rng)
+    references = draw_references(model, expert, run.rng)
 
     def label_anew() -> None:
         unknown = [replace(each, name=f"never seen {next(numbers)}") for each in references]
@@ -170,9 +165,9 @@ def cloning_phases(config: TrainingConfig) -> int:
     return min(config.demonstrations.phases, 1 + max(after - 1, 0) // config.demonstrations.repeat_every)
 
 
-def warm_up(run: Run) -> None:
+def warm_up(run: Trainer) -> None:
     """The episodes with which every run begins, so that replay and the agent's videos have something in them."""
-    steps = run.run.training.agent.warm_up_steps
+    steps = run.config.training.agent.warm_up_steps
     with progress("warm-up", steps) as advance:
         while run.counters.agent_steps < steps:
             before = run.counters.agent_steps
@@ -227,7 +222,7 @@ def measure(
     arithmetic = measured_rates().arithmetic
     with tempfile.TemporaryDirectory() as temporary:
         short = replace(config, tracker="none")
-        run = Run(
+        run = Trainer(
             RunConfig(task, method, preset, 1, str(demos), None, short), Path(temporary), Console(stderr=True)
         )
         warm_up(run)

@@ -26,7 +26,8 @@ from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.presets import PRESETS, SMOKE
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
+from bootifol.types import StepMetrics
 
 PACKAGE = Path(bootifol.__file__).parent
 SIMULATORS = "envs"
@@ -95,18 +96,18 @@ def training_step() -> Counter[tuple[Path, str]]:
         demos = Path(directory, "demos")
         for behavior in ("expert", "random"):
             record("drawn_reach", behavior, 12, demos / behavior, pictures)
-        run = Run(
+        run = Trainer(
             RunConfig("drawn_reach", "bootifol", "smoke", 1, str(demos), None, config),
             Path(directory, "run"),
             Console(quiet=True),
         )
         play = run.interactive.play_episode
 
-        def traced() -> None:
+        def traced() -> list[StepMetrics]:
             after_warm_up = run.counters.agent_steps >= config.agent.warm_up_steps
             sys.setprofile(note if after_warm_up else None)
             try:
-                play()
+                return play()
             finally:
                 sys.setprofile(None)
 

@@ -20,13 +20,14 @@ from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.files import read_arrays
 from bootifol.rewards.base import RewardModel
+from bootifol.rewards.config import RewardConfig
 from bootifol.rewards.references import draw_references
-from bootifol.rewards.registry import RewardConfig, check_method, make_reward_model
+from bootifol.rewards.registry import check_method, make_reward_model
 from bootifol.training.build import build_reward_model
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.interactive import InteractivePhase
 from bootifol.training.run_config import RunConfig
-from bootifol.types import Video
+from bootifol.types import StepMetrics, Video
 
 METHOD = "optimal_transport:OptimalTransport"
 TINY = [
@@ -149,10 +150,10 @@ def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
 ) -> None:
     play = InteractivePhase.play_episode
 
-    def play_and_stop(self: InteractivePhase) -> None:
+    def play_and_stop(self: InteractivePhase) -> list[StepMetrics]:
         if self.counters.episodes == 2:
             os.kill(os.getpid(), signal.SIGTERM)
-        play(self)
+        return play(self)
 
     with monkeypatch.context() as patch:
         patch.setattr(InteractivePhase, "play_episode", play_and_stop)

@@ -10,9 +10,9 @@ from typing import Any
 
 from rich.console import Console
 
-from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.import_videos import LARGEST_SQUARE, read_recordings
-from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
+from bootifol.demos.manifest import MANIFEST_NAME, find_demo_sets, read_manifest
 from bootifol.demos.match_set import match_of
 from bootifol.envs.rollout import PlayedEpisode
 from bootifol.errors import (
@@ -30,20 +30,13 @@ from bootifol.files import written_aside
 from bootifol.output import output_may_fail
 from bootifol.presets import preset as preset_named
 from bootifol.progress import progress
-from bootifol.reports.html import report
-from bootifol.rewards.references import draw_references
+from bootifol.rewards.references import draw_references, reference_rng
 from bootifol.rewards.registry import check_method
-from bootifol.training.build import (
-    build_backbone,
-    build_environment,
-    build_reward_model,
-    open_demos,
-    reference_rng,
-)
+from bootifol.training.build import build_backbone, build_environment, build_reward_model
 from bootifol.training.callbacks import Callback
 from bootifol.training.checkpoint import load_checkpoint
 from bootifol.training.config import TrainingConfig
-from bootifol.training.interruption import Stopped
+from bootifol.training.open_demos import open_demos
 from bootifol.training.overrides import overridden
 from bootifol.training.run_config import RunConfig, require_time_to_act
 from bootifol.training.run_directory import (
@@ -53,7 +46,7 @@ from bootifol.training.run_directory import (
     writing_run,
 )
 from bootifol.training.saved_policy import require_checkpoint, restored_agent
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 from bootifol.types import AnyPath, Rewards, Video
 from bootifol.video_files.writing import write_video
 
@@ -123,10 +116,10 @@ def train(
         require_time_to_act(run.training)
     with output_may_fail(), writing_run(directory):
         require_unused(directory)
-        learner = Run(run, directory, _console(), callbacks)
-        learner.begin_tracker()
+        trainer = Trainer(run, directory, _console(), callbacks)
+        trainer.begin_tracker()
         run.write(directory, list(command))
-        return TrainedRun(directory, finished=_learn_and_report(learner))
+        return TrainedRun(directory, finished=trainer.run())
 
 
 def resume(directory: AnyPath, trust: bool = False, callbacks: Sequence[Callback] = ()) -> bool:
@@ -148,7 +141,7 @@ def resume(directory: AnyPath, trust: bool = False, callbacks: Sequence[Callback
     run = _run_with_demos(directory, trust)
     with output_may_fail(), writing_run(directory):
         require_resumable(directory)
-        return _learn_and_report(Run(run, directory, _console(), callbacks))
+        return Trainer(run, directory, _console(), callbacks).run()
 
 
 @dataclass(frozen=True)
@@ -256,7 +249,7 @@ def scored_videos(
             f"{directory} was trained on the environment's reward: it has no reward for videos"
         )
     load_checkpoint(require_checkpoint(Path(directory)), {"reward_model": model})
-    expert = open_demos(run, build_backbone(run), _console()).expert
+    expert = open_demos(run, run.resolved_task(), build_backbone(run), _console()).expert
     references = draw_references(model, expert, reference_rng(run.seed, 0))
     length = min((len(reference.frames) for reference in references), default=None)
     for path in map(Path, videos):
@@ -285,29 +278,6 @@ def _run_with_demos(directory: AnyPath, trust: bool) -> RunConfig:
         )
     require_same_videos(Path(directory), run)
     return run
-
-
-def _learn_and_report(run: Run) -> bool:
-    finished = False
-    try:
-        finished = _learned_and_reported(run)
-    finally:
-        run.callbacks("on_end", finished)
-    return finished
-
-
-def _learned_and_reported(run: Run) -> bool:
-    if not run.learn():
-        return False
-    try:
-        run.finish()
-    except Stopped:
-        run.console.print(f"stopped before its last measurements. {run.how_to_resume()}")
-        return False
-    target = report([run.directory], run.directory / "report.html")
-    run.publish(target)
-    run.console.print(f"report: {target}")
-    return True
 
 
 def _console() -> Console:

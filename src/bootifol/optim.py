@@ -55,23 +55,17 @@ class GradientStep:
         # The host waits for a GPU here, once a step: what it fetches decides whether the step is taken.
         *numbers, total, length = to_floats([*metrics.values(), loss, norm])
         fetched = {**dict(zip(metrics, numbers, strict=True)), "loss/total": total}
-        try:
-            self._refuse_if_not_finite(total, fetched)
-            self._refuse_if_not_finite(length, {**fetched, "gradient norm": length})
-        except BootifolError:
+        if not np.isfinite([total, length]).all():
             for buffer, good in zip(self._module.buffers(), self._statistics, strict=True):
                 buffer.copy_(good)
-            raise
-        self._optimizer.step()
-        return fetched
-
-    def _refuse_if_not_finite(self, value: float, metrics: Metrics) -> None:
-        if not np.isfinite(value):
-            named = ", ".join(f"{name} {number:.4g}" for name, number in metrics.items())
+            told = {**fetched, "gradient norm": length} if np.isfinite(total) else fetched
+            named = ", ".join(f"{name} {number:.4g}" for name, number in told.items())
             raise BootifolError(
                 f"the reward model's loss is not a finite number at its gradient step {self._number} ({named}); the "
                 "step was not taken: lower the reward's learning_rate in the run's config.json"
             )
+        self._optimizer.step()
+        return fetched
 
 
 def take_step(optimizer: torch.optim.Adam, loss: Tensor, of_what: str, advice: str) -> None:

@@ -11,17 +11,17 @@ from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.frames.config import FrameConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.gaifo.config import GaifoConfig
-from bootifol.rewards.registry import RewardConfig
 from bootifol.rewards.virl.config import VirlConfig
 from bootifol.training.config import (
     AlignmentConfig,
+    DemonstrationConfig,
     EvaluationConfig,
     InteractiveConfig,
     TrainingConfig,
 )
-from bootifol.training.inferred_demonstrations import DemonstrationConfig
 
 PresetName = Literal[
     "paper",

@@ -21,7 +21,7 @@ from benchmarks import engine
 from bootifol.presets import CPU
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
-from bootifol.rewards.registry import RewardConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.training.config import TrainingConfig
 
 REWARD = replace(CPU.reward.bootifol, width_divisor=16, videos_per_class=2)

@@ -12,14 +12,14 @@ from rich.console import Console
 from bootifol.sweep.sweep_file import read_sweep
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 
 SMALL = read_sweep(Path(__file__).parents[2] / "benchmarks" / "suites" / "smoke.yaml")[0].config
 CONFIG = replace(SMALL, interactive=replace(SMALL.interactive, reward_updates_until=160))
 
 
 def counts(demos: Path, directory: Path, method: str, config: TrainingConfig) -> dict[str, float]:
-    run = Run(
+    run = Trainer(
         RunConfig("drawn_home", method, "smoke", 1, str(demos), None, config), directory, Console(quiet=True)
     )
     warm_up(run)

@@ -6,8 +6,9 @@ import pytest
 from PIL import Image
 from small_demo_sets import FRAMES, SIZE, WriteSet, moving_videos
 
-from bootifol.demos.check import Defects, check_demo_set, differences
+from bootifol.demos.check import Defects, check_demo_set
 from bootifol.demos.contact_sheet import contact_sheet
+from bootifol.demos.fit import differences
 from bootifol.demos.manifest import Manifest, read_manifest, write_manifest
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError

@@ -7,8 +7,8 @@ import tyro
 from bootifol.cli import demos
 from bootifol.cli.main import main
 from bootifol.demos import record as recording
-from bootifol.demos.demo_set import DemoSet, find_demo_sets
-from bootifol.demos.manifest import Manifest
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.manifest import Manifest, find_demo_sets
 from bootifol.errors import BootifolError
 from bootifol.video_files.writing import write_video
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from small_demo_sets import FRAMES, SIZE, WriteSet, moving_videos
 
-from bootifol.demos.demo_set import DemoSet, find_demo_sets
-from bootifol.demos.manifest import read_manifest, write_manifest
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.manifest import find_demo_sets, read_manifest, write_manifest
 from bootifol.demos.shards import videos_per_shard
 from bootifol.errors import BootifolError
 

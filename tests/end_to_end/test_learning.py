@@ -21,7 +21,7 @@ from bootifol.presets import DRAWN_PIXELS
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.tasks import make_environment, task_named
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 from bootifol.types import Rewards, Video
 
 TASK = "drawn_home"
@@ -52,9 +52,9 @@ class ShuffledReward(BootifolRewardModel):
         return self._shuffler.permutation(earlier)
 
 
-def new_run(demos: Path, directory: Path, seed: int = 1) -> Run:
+def new_run(demos: Path, directory: Path, seed: int = 1) -> Trainer:
     run = RunConfig(TASK, "bootifol", "drawn_pixels", seed, str(demos), None, CONFIG)
-    return Run(run, directory, Console(quiet=True))
+    return Trainer(run, directory, Console(quiet=True))
 
 
 def return_of(act: Act) -> float:
@@ -63,15 +63,15 @@ def return_of(act: Act) -> float:
     return float(np.mean([result.environment_return for result in results]))
 
 
-def return_of_agent(run: Run) -> float:
-    agent = run.components.agent
+def return_of_agent(run: Trainer) -> float:
+    agent = run.parts.agent
     return return_of(lambda observation: agent.act(observation, 0, explore=False))
 
 
 def test_a_policy_is_learned_from_videos_alone(tmp_path: Path, demos: Path) -> None:
     run = new_run(demos, tmp_path / "learned")
     frozen = return_of_agent(run)
-    random = return_of(make_random(run.environment, seed=0))
+    random = return_of(make_random(run.parts.environment, seed=0))
     assert run.learn()
     learned = return_of_agent(run)
 

@@ -18,7 +18,7 @@ from bootifol.presets import DRAWN
 from bootifol.rewards.bootifol.frames.model import FrameRewardModel
 from bootifol.tasks import make_environment, task_named
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 from bootifol.types import FrameStates, Rewards
 
 TASK = "drawn_reach"
@@ -48,14 +48,14 @@ def demos(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def return_after_learning(demos: Path, directory: Path, blind: bool) -> float:
-    run = Run(
+    run = Trainer(
         RunConfig(TASK, "bootifol", "drawn", 1, str(demos), None, CONFIG), directory, Console(quiet=True)
     )
     if blind:
-        run.components.reward_model.__class__ = BlindReward
+        run.parts.reward_model.__class__ = BlindReward
     assert run.learn()
     environment = make_environment(TASK, CONFIG.pictures, task_named(TASK).evaluation_steps)
-    agent = run.components.agent
+    agent = run.parts.agent
     results = evaluate(environment, lambda seen: agent.act(seen, 0, explore=False), range(9000, 9020))
     return float(np.mean([result.environment_return for result in results]))
 

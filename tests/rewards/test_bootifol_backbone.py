@@ -16,7 +16,8 @@ from bootifol.networks.backbones import Backbone, load_backbone
 from bootifol.presets import BACKBONE, PAPER
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
-from bootifol.rewards.registry import RewardConfig, make_backbone
+from bootifol.rewards.config import RewardConfig
+from bootifol.rewards.registry import make_backbone
 from bootifol.types import FeatureBatch, Video
 
 

@@ -12,10 +12,11 @@ from dot_videos import FRAMES, SIZE, DotVideos
 from bootifol.errors import BootifolError
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.learned import LearnedRewardModel
-from bootifol.rewards.registry import METHODS, RewardConfig, make_reward_model
+from bootifol.rewards.registry import METHODS, make_reward_model
 from bootifol.rewards.virl.config import VirlConfig
 from bootifol.types import Arrays, Metrics, Rewards, Video
 

@@ -11,9 +11,10 @@ from bootifol.errors import BootifolError
 from bootifol.presets import PRESETS, PresetName
 from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
 from bootifol.rewards.gaifo.config import GaifoConfig
-from bootifol.rewards.registry import METHODS, RewardConfig, make_reward_model
+from bootifol.rewards.registry import METHODS, make_reward_model
 from bootifol.rewards.virl.config import VirlConfig
 from bootifol.types import Video
 

@@ -15,10 +15,10 @@ from tiny_runs import TINY, WITH_DEMONSTRATIONS, new_run, resumed
 from bootifol import api
 from bootifol.evaluation.tables import read_ranking
 from bootifol.networks.backbones import Backbone
-from bootifol.rewards.registry import RewardConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.training.config import TrainingConfig
 from bootifol.training.interactive import InteractivePhase
-from bootifol.types import Features, Frames
+from bootifol.types import Features, Frames, StepMetrics
 
 
 def with_backbone(config: TrainingConfig, name: str) -> TrainingConfig:
@@ -81,7 +81,7 @@ def test_another_run_finds_the_features_of_the_videos(
     counted.clear()
     run = new_run(tmp_path / "second", own_demos, config=config, seed=2)
     assert counted == []
-    video = run.components.agent_videos
+    video = run.parts.agent_videos
     assert video.bytes_needed(6, FRAMES, 32, 32) == sum(
         array.nbytes for array in (video._features, video._frames)
     )
@@ -95,10 +95,10 @@ def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
     assert whole.learn()
     play = InteractivePhase.play_episode
 
-    def play_and_signal(self: InteractivePhase) -> None:
+    def play_and_signal(self: InteractivePhase) -> list[StepMetrics]:
         if self.counters.episodes == 4:
             os.kill(os.getpid(), signal.SIGTERM)
-        play(self)
+        return play(self)
 
     with monkeypatch.context() as patch:
         patch.setattr(InteractivePhase, "play_episode", play_and_signal)
@@ -106,8 +106,8 @@ def test_a_run_stopped_and_resumed_is_the_uninterrupted_run(
     rest = resumed(tmp_path / "parts")
     assert (rest.counters.episodes, rest.interactive.steps_in_progress) == (4, 1)
     assert rest.learn()
-    for name, component in whole.components.stateful().items():
-        expected, found = component.state(), rest.components.stateful()[name].state()
+    for name, component in whole.parts.stateful().items():
+        expected, found = component.state(), rest.parts.stateful()[name].state()
         assert expected.keys() == found.keys()
         for array in expected:
             np.testing.assert_array_equal(found[array], expected[array], err_msg=f"{name}: {array}")

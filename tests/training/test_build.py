@@ -10,7 +10,7 @@ from tiny_runs import SEEING, TINY, new_run
 
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import read_ranking
-from bootifol.rewards.registry import RewardConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.types import Video
 
 
@@ -26,7 +26,7 @@ def test_held_out_videos_are_none_of_training(
 ) -> None:
     backbone = tiny_backbone if with_backbone else None
     config = replace(TINY, reward=RewardConfig(replace(TINY.reward.bootifol, backbone=backbone)))
-    opened = new_run(tmp_path / "run", demos, config=config).demos
+    opened = new_run(tmp_path / "run", demos, config=config).parts.demos
     assert {kind: len(videos) for kind, videos in opened.held_out.items()} == {
         "expert": 2,
         "random": 2,
@@ -45,10 +45,10 @@ def test_episodes_longer_than_the_videos_want_a_reward_of_single_frames(tmp_path
     run = new_run(tmp_path / "frames", demos, config=replace(SEEING, episode_steps=45))
     assert run.learn()
     assert run.counters.agent_steps == 270, "six episodes: the fewest that hold 240 steps"
-    assert run.components.replay.agent_steps_of(0) == 45
+    assert run.parts.replay.agent_steps_of(0) == 45
     run.evaluator.rank()
-    newest = run.components.agent_videos.newest(1)[0]
+    newest = run.parts.agent_videos.newest(1)[0]
     ranked = read_ranking(tmp_path / "frames" / "ranking.csv").rows[-1]
     assert (ranked.kind, ranked.video) == ("agent", newest.name)
-    of_first = run.components.reward_model.label(newest, ())[:30]
+    of_first = run.parts.reward_model.label(newest, ())[:30]
     assert ranked.reward == pytest.approx(of_first.sum(), rel=1e-6), "of as many steps as the videos have"

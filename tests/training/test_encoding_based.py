@@ -15,10 +15,10 @@ from bootifol import api
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
-from bootifol.rewards.registry import RewardConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.training.build import build_agent, build_reward_model
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 from bootifol.types import Action, Video
 
 SHORT = replace(
@@ -45,26 +45,26 @@ def test_a_finished_run_is_evaluated_with_its_own_encoder(
     run.finish()
     finals = np.stack(actions)
     actions.clear()
-    api.evaluate(tmp_path / "run", SHORT.evaluation.final_episodes, seed=run.run.seed)
+    api.evaluate(tmp_path / "run", SHORT.evaluation.final_episodes, seed=run.config.seed)
     assert len(np.unique(finals, axis=0)) > 10
     np.testing.assert_array_equal(np.stack(actions), finals)
 
 
 def test_the_encoder_is_taught_by_the_reward_alone(tmp_path: Path, demos: Path) -> None:
     run = new_run(tmp_path / "run", demos, config=ENCODING_BASED)
-    model, agent, rng = run.components.reward_model, run.components.agent, np.random.default_rng(0)
+    model, agent, rng = run.parts.reward_model, run.parts.agent, np.random.default_rng(0)
     run.interactive.play_episode()
     before = model.state()
-    agent.update(run.components.replay.sample(8, rng), 0)
+    agent.update(run.parts.replay.sample(8, rng), 0)
     for name, array in model.state().items():
         np.testing.assert_array_equal(array, before[name], err_msg=name)
 
 
 def test_replay_gives_whole_pictures(tmp_path: Path, demos: Path) -> None:
     run = new_run(tmp_path / "run", demos, config=ENCODING_BASED)
-    assert run.components.replay.shift == 0
-    assert run.components.demonstrations is not None
-    assert run.components.demonstrations.replay.shift == 0
+    assert run.parts.replay.shift == 0
+    assert run.parts.demonstrations is not None
+    assert run.parts.demonstrations.replay.shift == 0
 
 
 def test_a_method_without_encodings_is_refused(tmp_path: Path, demos: Path) -> None:
@@ -90,15 +90,15 @@ def test_encodings_of_a_backbone_are_refused(demos: Path, tiny_backbone: str) ->
 
 def test_without_an_alignment_phase_the_reward_is_still_finite(tmp_path: Path, demos: Path) -> None:
     config = replace(SHORT, alignment=replace(SHORT.alignment, gradient_steps=0))
-    run = Run(
+    run = Trainer(
         RunConfig("drawn_reach", "bootifol", "smoke", 1, str(demos), None, config),
         tmp_path / "run",
         Console(quiet=True),
     )
     assert run.learn()
     assert run.counters.alignment_steps == 0 < run.counters.reward_updates
-    expert = run.demos.expert
-    rewards = run.components.reward_model.label(
+    expert = run.parts.demos.expert
+    rewards = run.parts.reward_model.label(
         Video("agent", expert[0].frames), [expert[index] for index in range(8)]
     )
     assert np.isfinite(rewards).all()

@@ -38,11 +38,13 @@ def test_nan_rewards_give_the_same_policy_bit_for_bit(
     assert usual.learn()
     request.getfixturevalue("nan_rewards")
     poisoned = new_run(tmp_path / "poisoned", demos, method, config)
-    assert np.isnan(play_episode(poisoned.environment, poisoned.interactive._act, 1, "x").environment_return)
+    assert np.isnan(
+        play_episode(poisoned.parts.environment, poisoned.interactive._act, 1, "x").environment_return
+    )
     poisoned = new_run(tmp_path / "again", demos, method, config)
     assert poisoned.learn()
-    for name, component in usual.components.stateful().items():
-        theirs = poisoned.components.stateful()[name].state()
+    for name, component in usual.parts.stateful().items():
+        theirs = poisoned.parts.stateful()[name].state()
         for key, array in component.state().items():
             np.testing.assert_array_equal(array, theirs[key], err_msg=f"{name}: {key}")
 
@@ -56,5 +58,5 @@ def test_the_upper_bound_does_read_it(tmp_path: Path, demos: Path, nan_rewards: 
 def test_the_upper_bound_has_no_demonstrations(tmp_path: Path, demos: Path) -> None:
     """They would need the rewards of an expert's videos, and no video tells them."""
     run = new_run(tmp_path / "run", demos, method="environment", config=WITH_DEMONSTRATIONS)
-    assert run.components.demonstrations is None
+    assert run.parts.demonstrations is None
     assert run.learn()

@@ -29,15 +29,15 @@ def test_every_evaluation_has_starts_of_its_own(tmp_path: Path, demos: Path) -> 
     run.evaluator.final_returns()
     starts: dict[int, list[int]] = {}
     for row in read_evaluations(tmp_path / "run" / "evaluations.csv").rows:
-        if row.episode_steps == run.run.resolved_task().evaluation_steps:
+        if row.episode_steps == run.task.evaluation_steps:
             starts.setdefault(row.agent_steps, []).append(row.seed)
     on_the_way, final = sorted(starts)[:-1], max(starts)
     assert len(on_the_way) == 2
-    assert starts[final] == evaluation_seeds(run.run.seed, 2)
+    assert starts[final] == evaluation_seeds(run.config.seed, 2)
     for agent_steps in on_the_way:
-        assert starts[agent_steps] == evaluation_seeds(run.run.seed, 2, agent_steps)
+        assert starts[agent_steps] == evaluation_seeds(run.config.seed, 2, agent_steps)
     every = [seed for seeds in starts.values() for seed in seeds]
-    trained_from = {episode_seed(run.run.seed, episode) for episode in range(10)}
+    trained_from = {episode_seed(run.config.seed, episode) for episode in range(10)}
     assert len({*every} | trained_from) == len(every) + 10
 
 

@@ -48,14 +48,14 @@ def test_measuring_changes_nothing_of_the_run(
     method: str, config: TrainingConfig, tmp_path: Path, demos: Path
 ) -> None:
     run = new_run(tmp_path / "run", demos, method, config)
-    before = {name: part.state() for name, part in run.components.stateful().items()}
+    before = {name: part.state() for name, part in run.parts.stateful().items()}
     budget = Budget(config.interactive.agent_steps, 60.0, cloning_share=0.1)
     told = forecast(
-        replace(run.run, time_budget=60.0), run.components, budget, Counters(alignment_seconds=10.0)
+        replace(run.config, time_budget=60.0), run.parts, budget, Counters(alignment_seconds=10.0)
     )
-    phases = config.demonstrations.phases if run.components.demonstrations else 0
+    phases = config.demonstrations.phases if run.parts.demonstrations else 0
     assert told.seconds == pytest.approx(60.0 - 10.0 - 6.0 * phases)
     assert told.agent_steps > 0 and told.updates >= 0
-    for name, part in run.components.stateful().items():
+    for name, part in run.parts.stateful().items():
         for key, array in part.state().items():
             np.testing.assert_array_equal(array, before[name][key], err_msg=f"{name}/{key}")

@@ -24,7 +24,8 @@ from bootifol.training.cloning import (
     one_cycle,
     steps_of_a_phase,
 )
-from bootifol.training.inferred_demonstrations import DemonstrationConfig, Demonstrations
+from bootifol.training.config import DemonstrationConfig
+from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.types import Arrays, Batch, Episode, FrameBatch, Frames, Metrics, Video, VideoSource
 
 SIZE, STEPS, MOVES = 32, 12, 4
@@ -246,9 +247,13 @@ def test_a_cloning_phase_ends_with_its_share_of_the_time(monkeypatch: pytest.Mon
     agent = DrQv2(DrQv2Config(encoder="strided", hidden_dim=16, batch_size=8), SIZE, 2, 1, seed=0)
     counters = Counters(agent_steps=1920, cloning_seconds=7.0)
     budget = Budget(agent_steps=1000, seconds=100.0, cloning_share=0.3)
-    steps = [*cloning_phase(agent, demonstrations, agent_steps(), CountingReward(), rng, budget, counters)]
+    phase = cloning_phase(
+        agent, demonstrations, agent_steps(), CountingReward(), rng, budget, counters, log_every=100
+    )
+    steps = [*phase]
     learned = [
-        sum(name in metrics for metrics in steps) for name in ("inverse_dynamics/loss", "agent/cloning_loss")
+        sum(name in step.metrics[0] for step in steps)
+        for name in ("inverse_dynamics/loss", "agent/cloning_loss")
     ]
     assert learned == [11, 31 - 11 - 6]
     assert counters.cloning_steps == steps_of_a_phase(demonstrations)
@@ -262,8 +267,8 @@ def test_warm_up_actions_are_held(tmp_path: Path, demos: Path) -> None:
     )
     run = new_run(tmp_path / "run", demos, config=config)
     run.interactive.play_episode()
-    transitions = np.arange(len(run.components.replay))
-    actions = run.components.replay.sample(
+    transitions = np.arange(len(run.parts.replay))
+    actions = run.parts.replay.sample(
         len(transitions), np.random.default_rng(0), transitions=transitions
     ).action.numpy()
     changes = np.flatnonzero((actions[1:] != actions[:-1]).any(axis=1)) + 1

@@ -16,7 +16,7 @@ from tiny_runs import TINY, new_run
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.rewards.registry import METHODS
 from bootifol.training import build
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 from bootifol.types import Action, Arrays, Metrics, Observation, Rewards, Video, VideoSource
 
 CONFIG = replace(TINY, interactive=replace(TINY.interactive, reward_updates_until=150))
@@ -38,13 +38,11 @@ def test_the_reward_learns_as_long_as_its_paper_says(
 ) -> None:
     run = new_run(tmp_path / "run", demos, method, CONFIG)
     renewed_at: list[int] = []
-    monkeypatch.setattr(
-        run.components.replay, "relabel", lambda *_: renewed_at.append(run.counters.agent_steps)
-    )
+    monkeypatch.setattr(run.parts.replay, "relabel", lambda *_: renewed_at.append(run.counters.agent_steps))
     while not run.budget.ended(run.counters):
         run.interactive.play_episode()
     assert renewed_at == UPDATES_AT[method]  # and rewards that are not stale are left alone
-    assert run.counters.reward_updates == run.components.reward_model.version == len(UPDATES_AT[method])
+    assert run.counters.reward_updates == run.parts.reward_model.version == len(UPDATES_AT[method])
 
 
 class EndsEarly(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -68,10 +66,10 @@ def test_rewards_of_episodes_that_ended_early_are_renewed_at_their_own_length(
 ) -> None:
     config = replace(CONFIG, interactive=replace(CONFIG.interactive, relabel_episodes=6))
     run = new_run(tmp_path / "run", demos, method, config)
-    run.interactive.environment = EndsEarly(run.environment)
+    run.interactive.environment = EndsEarly(run.parts.environment)
     while run.counters.reward_updates < 2:
         run.interactive.play_episode()
-    replay = run.components.replay
+    replay = run.parts.replay
     assert {replay.agent_steps_of(episode) for episode in replay.episode_ids} == {4, 5, 6, 7, 8, 9}
 
 
@@ -136,9 +134,9 @@ MANY_EPISODES = replace(
 """Twelve episodes, of which replay keeps nine and the ring of videos four."""
 
 
-def stored_rewards(run: Run) -> dict[int, float]:
+def stored_rewards(run: Trainer) -> dict[int, float]:
     """The reward that replay holds for each episode, at all of its steps."""
-    replay = run.components.replay
+    replay = run.parts.replay
     batch = replay.sample(len(replay), np.random.default_rng(0), transitions=np.arange(len(replay)))
     by_episode = batch.reward.numpy().reshape(-1, STEPS)
     assert (by_episode == by_episode[:, :1]).all()
@@ -163,7 +161,7 @@ def test_stored_rewards_are_those_of_their_episode(
         assert all(stored[episode] % 100 == episode for episode in stored)
         renewed |= changed
 
-        ring = run.components.agent_videos.state()
+        ring = run.parts.agent_videos.state()
         episodes = map(number, json.loads(ring["names"].tobytes()))
         assert ring["rewards"].tolist() == [stored[episode] for episode in episodes]
     assert len(renewed) > 4

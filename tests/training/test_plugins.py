@@ -17,7 +17,8 @@ from bootifol import plugins
 from bootifol.cli.main import main
 from bootifol.envs.pictures import PictureConfig
 from bootifol.errors import BootifolError
-from bootifol.rewards.registry import RewardConfig, check_method, make_reward_model
+from bootifol.rewards.config import RewardConfig
+from bootifol.rewards.registry import check_method, make_reward_model
 from bootifol.tasks import make_environment, task_named
 
 ENTRY_POINTS = """

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_runs import ENDS_SOON, RUNS, TINY, WITH_DEMONSTRATIONS, new_run, resumed
+from tiny_runs import ENDS_SOON, RUNS, TINY, WITH_DEMONSTRATIONS, NoFurther, new_run, no_further, resumed
 
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.errors import BootifolError
@@ -22,17 +22,18 @@ from bootifol.training.config import TrainingConfig
 from bootifol.training.evaluator import Evaluator
 from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.training.interactive import InteractivePhase
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
+from bootifol.types import StepMetrics
 
 
 def signal_at(monkeypatch: pytest.MonkeyPatch, number: signal.Signals, episode: int) -> None:
     """Sends this process a signal while episode `episode` is being played."""
     play = InteractivePhase.play_episode
 
-    def play_and_signal(self: InteractivePhase) -> None:
+    def play_and_signal(self: InteractivePhase) -> list[StepMetrics]:
         if self.counters.episodes == episode:
             os.kill(os.getpid(), number)
-        play(self)
+        return play(self)
 
     monkeypatch.setattr(InteractivePhase, "play_episode", play_and_signal)
 
@@ -91,9 +92,9 @@ def assert_same_checkpoint(one: Path, other: Path) -> None:
         assert a["counters"][name] == b["counters"][name], name
 
 
-def next_actions(run: Run) -> np.ndarray:
-    observation, _ = run.environment.reset(seed=5)
-    return np.stack([run.components.agent.act(observation, 240, explore=True) for _ in range(3)])
+def next_actions(run: Trainer) -> np.ndarray:
+    observation, _ = run.parts.environment.reset(seed=5)
+    return np.stack([run.parts.agent.act(observation, 240, explore=True) for _ in range(3)])
 
 
 @pytest.mark.parametrize(("method", "config"), RUNS)
@@ -135,7 +136,7 @@ def test_stops_at_any_moment_leave_the_uninterrupted_run(
 
     new_run(tmp_path / "parts", demos, config=WITH_DEMONSTRATIONS)
     moments = [
-        (Run, "_checkpoint_if_due", 4),
+        (Trainer, "_checkpoint_if_due", 4),
         (Evaluator, "rank", 1),
         (InteractivePhase, "_update_agent", 17),
         (InteractivePhase, "_update_agent", 25),
@@ -171,7 +172,7 @@ def test_an_environment_that_fails_loses_nothing(
     whole = new_run(tmp_path / "whole", demos)
     assert whole.learn()
     run = new_run(tmp_path / "parts", demos)
-    step, calls = run.environment.simulator.step, []
+    step, calls = run.parts.environment.simulator.step, []
 
     def failing(action: np.ndarray) -> object:
         calls.append(action)
@@ -179,7 +180,7 @@ def test_an_environment_that_fails_loses_nothing(
             raise ZeroDivisionError("the arm fell off")
         return step(action)
 
-    monkeypatch.setattr(run.environment.simulator, "step", failing)
+    monkeypatch.setattr(run.parts.environment.simulator, "step", failing)
     with pytest.raises(
         BootifolError, match=r"the arm fell off \(ZeroDivisionError in test_resume.py.*--resume"
     ):
@@ -203,7 +204,7 @@ def test_a_run_goes_on_with_another_name_of_the_device(
     path = tmp_path / "parts" / "config.json"
     path.write_text(path.read_text().replace('"device": "auto"', '"device": "cpu"'))
     rest = resumed(tmp_path / "parts")
-    assert rest.run.training.device == "cpu"
+    assert rest.config.training.device == "cpu"
     assert rest.learn()
     assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
 
@@ -215,13 +216,13 @@ def test_ctrl_c_during_alignment_can_be_resumed(
     assert whole.learn()
 
     run = new_run(tmp_path / "parts", demos)
-    step = run.components.reward_model._step
+    step = run.parts.reward_model._step
 
     def step_and_signal(*arguments: object, **named: object) -> object:
         os.kill(os.getpid(), signal.SIGINT)
         return step(*arguments, **named)
 
-    monkeypatch.setattr(run.components.reward_model, "_step", step_and_signal)
+    monkeypatch.setattr(run.parts.reward_model, "_step", step_and_signal)
     assert not run.learn()
     rest = resumed(tmp_path / "parts")
     assert rest.counters.alignment_steps == 1
@@ -244,8 +245,9 @@ def test_what_was_measured_after_the_checkpoint_is_undone_once_the_run_goes_on(
     there = [file.read_text() for file in files]
     rest = resumed(tmp_path / "run")
     assert [file.read_text() for file in files] == there, "looking at a run changes nothing"
-    monkeypatch.setattr(Run, "_align", lambda *_: False)
-    rest.learn()
+    monkeypatch.setattr(Trainer, "_align", no_further)
+    with pytest.raises(NoFurther):
+        rest.learn()
     assert [file.read_text() for file in files] == written
     assert "120" in written[1] and written[2].count("\n") > 1
 
@@ -255,8 +257,9 @@ def test_metrics_of_a_run_that_died_before_its_first_checkpoint_are_undone(
 ) -> None:
     new_run(tmp_path / "run", demos)
     (tmp_path / "run" / "metrics.jsonl").write_text('{"phase": "alignment", "gradient_step": 2}\n')
-    monkeypatch.setattr(Run, "_align", lambda *_: False)
-    resumed(tmp_path / "run").learn()
+    monkeypatch.setattr(Trainer, "_align", no_further)
+    with pytest.raises(NoFurther):
+        resumed(tmp_path / "run").learn()
     assert (tmp_path / "run" / "metrics.jsonl").read_text() == ""
 
 
@@ -274,11 +277,12 @@ def test_a_full_disk_during_a_checkpoint_leaves_the_last_good_one(
         run = new_run(tmp_path / "parts", demos)
         play = InteractivePhase.play_episode
 
-        def play_and_fill(self: InteractivePhase) -> None:
-            play(self)
+        def play_and_fill(self: InteractivePhase) -> list[StepMetrics]:
+            metrics = play(self)
             if self.counters.episodes == 2:
                 patch.setattr("bootifol.files.save_file", no_space)
                 os.kill(os.getpid(), signal.SIGTERM)
+            return metrics
 
         patch.setattr(InteractivePhase, "play_episode", play_and_fill)
         with pytest.raises(BootifolError, match=r"No space left on device.*train --resume"):

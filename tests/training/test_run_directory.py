@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
-from tiny_runs import ENDS_SOON, TINY, new_run, record_demos, resumed
+from tiny_runs import ENDS_SOON, TINY, NoFurther, new_run, no_further, record_demos, resumed
 
 from bootifol import api
 from bootifol.cli.main import main
@@ -22,10 +22,11 @@ from bootifol.errors import BootifolError
 from bootifol.files import read_json
 from bootifol.locks import one_writer
 from bootifol.tracking import RunLog, TensorBoard, cut_metrics
-from bootifol.training import build
+from bootifol.training import open_demos
 from bootifol.training.checkpoint import newest_checkpoint
 from bootifol.training.interactive import InteractivePhase
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
+from bootifol.types import StepMetrics
 
 
 @pytest.fixture
@@ -166,10 +167,10 @@ def test_a_closed_terminal_is_a_stop_unless_the_run_was_to_outlive_it(
 ) -> None:
     play = InteractivePhase.play_episode
 
-    def hung_up(self: InteractivePhase) -> None:
+    def hung_up(self: InteractivePhase) -> list[StepMetrics]:
         if self.counters.episodes == 1:
             os.kill(os.getpid(), signal.SIGHUP)
-        play(self)
+        return play(self)
 
     monkeypatch.setattr(InteractivePhase, "play_episode", hung_up)
     assert not new_run(tmp_path / "stops", demos, config=ENDS_SOON).learn()
@@ -184,7 +185,7 @@ def test_large_sets_are_verified_while_the_run_learns(
     tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own = Path(shutil.copytree(demos, tmp_path / "demos"))
-    monkeypatch.setattr(build, "_VERIFY_BELOW_BYTES", 0)
+    monkeypatch.setattr(open_demos, "_VERIFY_BELOW_BYTES", 0)
     shard = own / "random" / "shard-00000.npy"
     flipped = bytearray(shard.read_bytes())
     flipped[-1] ^= 1
@@ -249,6 +250,7 @@ def test_a_changed_configuration_is_told(run: Path, capsys: pytest.CaptureFixtur
 def test_a_run_has_a_checkpoint_from_its_first_moment(
     tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Run, "_align", lambda *_: False)
-    new_run(tmp_path / "run", demos, config=TINY).learn()
+    monkeypatch.setattr(Trainer, "_align", no_further)
+    with pytest.raises(NoFurther):
+        new_run(tmp_path / "run", demos, config=TINY).learn()
     assert newest_checkpoint(tmp_path / "run" / "checkpoints") is not None

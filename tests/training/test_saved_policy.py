@@ -21,7 +21,7 @@ from bootifol.errors import BootifolError
 from bootifol.evaluation import returns
 from bootifol.files import read_arrays
 from bootifol.training.checkpoint import newest_checkpoint
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 from bootifol.types import Episode
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "run_a_policy.py"
@@ -102,17 +102,17 @@ def test_an_encoding_based_policy_comes_from_the_checkpoint(
 
 def test_every_checkpoint_renews_it(tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     steps: list[int] = []
-    checkpoint = Run._checkpoint
+    checkpoint = Trainer._checkpoint
 
-    def noting(self: Run) -> None:
+    def noting(self: Trainer) -> None:
         checkpoint(self)
         policy = bootifol.load_policy(self.directory)
         steps.append(policy.config.agent_steps)
         arrays = read_arrays(self.directory / "policy.safetensors", "")
-        state = self.components.agent.state()
+        state = self.parts.agent.state()
         assert all((array == state[f"averaged_{name}"]).all() for name, array in arrays.items())
 
-    monkeypatch.setattr(Run, "_checkpoint", noting)
+    monkeypatch.setattr(Trainer, "_checkpoint", noting)
     assert new_run(tmp_path / "run", demos, config=replace(ENDS_SOON, checkpoint_minutes=1e-9)).learn()
     assert steps[0] == 0 and steps[-1] == 90 and 30 in steps
 

@@ -12,11 +12,11 @@ from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.presets import SMOKE
 from bootifol.rewards.bootifol.frames.config import FrameConfig
-from bootifol.rewards.registry import METHODS, RewardConfig
-from bootifol.training.config import AlignmentConfig, InteractiveConfig, TrainingConfig
-from bootifol.training.inferred_demonstrations import DemonstrationConfig
+from bootifol.rewards.config import RewardConfig
+from bootifol.rewards.registry import METHODS
+from bootifol.training.config import AlignmentConfig, DemonstrationConfig, InteractiveConfig, TrainingConfig
 from bootifol.training.run_config import RunConfig
-from bootifol.training.train import Run
+from bootifol.training.trainer import Trainer
 
 PICTURES = PictureConfig(agent_size=32, video_size=32)
 
@@ -111,6 +111,15 @@ IMITATING_RUNS = [run for run in RUNS if run.id != "environment"]
 """The same without the upper bound."""
 
 
+class NoFurther(Exception):  # noqa: N818
+    """Ends a run as an error does: nothing more is written."""
+
+
+def no_further(*_: object) -> None:
+    """In place of a phase."""
+    raise NoFurther
+
+
 def record_demos(directory: Path) -> Path:
     for behavior in ("expert", "random", "half_good"):
         record("drawn_reach", behavior, 12, directory / behavior, PICTURES)
@@ -119,12 +128,12 @@ def record_demos(directory: Path) -> Path:
 
 def new_run(
     directory: Path, demos: Path, method: str = "bootifol", config: TrainingConfig = TINY, seed: int = 1
-) -> Run:
+) -> Trainer:
     run = RunConfig("drawn_reach", method, "smoke", seed, str(demos), None, config)
-    made = Run(run, directory, Console(quiet=True))
+    made = Trainer(run, directory, Console(quiet=True))
     run.write(directory, ["bootifol", "train"])
     return made
 
 
-def resumed(directory: Path) -> Run:
-    return Run(RunConfig.read(directory), directory, Console(quiet=True))
+def resumed(directory: Path) -> Trainer:
+    return Trainer(RunConfig.read(directory), directory, Console(quiet=True))

@@ -178,7 +178,7 @@ def check(
         action_repeat: Simulator steps an agent step, if training shall have others than the task's own.
     """
     from bootifol.demos.check import check_demo_set
-    from bootifol.demos.demo_set import find_demo_sets
+    from bootifol.demos.manifest import find_demo_sets
     from bootifol.tasks import task_named
 
     compared = None if task is None else task_named(task, action_repeat, episode_steps)
@@ -307,7 +307,7 @@ def export(
 
 def _train_words(task: str, demos: Path, manifest: Manifest) -> str:
     """What to type to learn from videos: with the preset for the task, and the pictures' flags where it needs them."""
-    from bootifol.demos.check import picture_flags
+    from bootifol.demos.fit import picture_flags
     from bootifol.presets import preset
     from bootifol.tasks import TASKS, short_name
 

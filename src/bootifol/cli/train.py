@@ -226,8 +226,7 @@ def _task_shown(demos: Path, trust: bool) -> str:
     Raises:
         BootifolError: nothing there was recorded, more than one task was, or it is code that nobody trusts.
     """
-    from bootifol.demos.demo_set import find_demo_sets
-    from bootifol.demos.manifest import MANIFEST_NAME, read_manifest
+    from bootifol.demos.manifest import MANIFEST_NAME, find_demo_sets, read_manifest
 
     tasks: set[str] = set()
     for directory in find_demo_sets(demos).values():

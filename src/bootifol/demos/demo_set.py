@@ -161,36 +161,6 @@ def draw(total: int, count: int, rng: np.random.Generator) -> list[int]:
     return [int(index) for index in rng.choice(total, size=count, replace=count > total)]
 
 
-def find_demo_sets(path: Path | str) -> dict[str, Path]:
-    """The demo sets at a path, by behavior.
-
-    Args:
-        path: a directory of demo sets, one subdirectory a behavior (`DEMOS/expert`, `DEMOS/random`,
-            `DEMOS/half_good`: what `bootifol demos record` and `import` write), or one demo set itself.
-
-    Returns:
-        Directories by behavior, at least one.
-
-    Raises:
-        BootifolError: there is none, or there are two of one behavior.
-    """
-    path = Path(path)
-    found: dict[str, Path] = {}
-    for manifest in [*path.glob(MANIFEST_NAME), *sorted(path.glob(f"*/{MANIFEST_NAME}"))]:
-        behavior = read_manifest(manifest.parent).behavior
-        if behavior in found:
-            raise BootifolError(
-                f"{found[behavior]} and {manifest.parent} both hold {behavior} videos: move one of them away"
-            )
-        found[behavior] = manifest.parent
-    if not found:
-        raise BootifolError(
-            f"there is no demo set at {path} (no {MANIFEST_NAME} in it or one directory below): record one "
-            f"with `bootifol demos record --task TASK --out {path}`"
-        )
-    return found
-
-
 def listed(names: Sequence[str], most: int = 5) -> str:
     """Names for a sentence, the first few when there are many."""
     shown = ", ".join(names[:most])

@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from bootifol.demos.demo_set import DemoSet, find_demo_sets
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.manifest import find_demo_sets
 from bootifol.demos.shards import sha256_of_frames
 from bootifol.errors import BootifolError
 from bootifol.files import written_aside

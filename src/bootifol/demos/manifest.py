@@ -172,6 +172,36 @@ def read_manifest(directory: Path) -> Manifest:
     return manifest
 
 
+def find_demo_sets(path: Path | str) -> dict[str, Path]:
+    """The demo sets at a path, by behavior.
+
+    Args:
+        path: a directory of demo sets, one subdirectory a behavior (`DEMOS/expert`, `DEMOS/random`,
+            `DEMOS/half_good`: what `bootifol demos record` and `import` write), or one demo set itself.
+
+    Returns:
+        Directories by behavior, at least one.
+
+    Raises:
+        BootifolError: there is none, or there are two of one behavior.
+    """
+    path = Path(path)
+    found: dict[str, Path] = {}
+    for manifest in [*path.glob(MANIFEST_NAME), *sorted(path.glob(f"*/{MANIFEST_NAME}"))]:
+        behavior = read_manifest(manifest.parent).behavior
+        if behavior in found:
+            raise BootifolError(
+                f"{found[behavior]} and {manifest.parent} both hold {behavior} videos: move one of them away"
+            )
+        found[behavior] = manifest.parent
+    if not found:
+        raise BootifolError(
+            f"there is no demo set at {path} (no {MANIFEST_NAME} in it or one directory below): record one "
+            f"with `bootifol demos record --task TASK --out {path}`"
+        )
+    return found
+
+
 def _check_consistent(path: Path, manifest: Manifest) -> None:
     in_shards = sum(shard.videos for shard in manifest.shards)
     if in_shards != len(manifest.videos):

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from bootifol.demos.check import shown_like
 from bootifol.demos.contact_sheet import write_contact_sheet
-from bootifol.demos.demo_set import DemoSet, find_demo_sets
-from bootifol.demos.manifest import Manifest, Shard, VideoEntry, write_manifest
+from bootifol.demos.demo_set import DemoSet
+from bootifol.demos.fit import shown_like
+from bootifol.demos.manifest import Manifest, Shard, VideoEntry, find_demo_sets, write_manifest
 from bootifol.demos.matching import REPAIRS, Match, Picture, Repair, difference, fit
 from bootifol.demos.scene_match import (
     FIRST_FRAMES_NAME,

@@ -1,12 +1,12 @@
 """The reward methods by name, and anyone's own as `MODULE:NAME` or from an installed package (docs/add_a_method.md).
 
-To add one to the library: a folder beside this file, a field of `RewardConfig` and an entry of METHODS.
+To add one to the library: a folder beside this file, a field of `RewardConfig` in `config.py` and an entry of METHODS.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from bootifol.errors import BootifolError
 from bootifol.networks.backbones import Backbone, load_backbone
@@ -15,31 +15,12 @@ from bootifol.rewards.base import RewardModel
 from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.frames.model import FrameRewardModel
 from bootifol.rewards.bootifol.model import BootifolRewardModel
-from bootifol.rewards.context_translation.config import ContextTranslationConfig
+from bootifol.rewards.config import RewardConfig
 from bootifol.rewards.context_translation.model import ContextTranslationRewardModel
 from bootifol.rewards.environment import EnvironmentRewardModel, SeeingEnvironmentRewardModel
-from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.gaifo.model import GaifoRewardModel
 from bootifol.rewards.own import own_reward_model
-from bootifol.rewards.virl.config import VirlConfig
 from bootifol.rewards.virl.model import VirlRewardModel
-
-
-@dataclass(frozen=True)
-class RewardConfig:
-    """One section a method, of its name; only the chosen method's is read."""
-
-    bootifol: BootifolConfig = field(default_factory=BootifolConfig)
-    """BootIfOL's reward model."""
-
-    virl: VirlConfig = field(default_factory=VirlConfig)
-    """ViRL's reward model."""
-
-    context_translation: ContextTranslationConfig = field(default_factory=ContextTranslationConfig)
-    """The reward model of context translation."""
-
-    gaifo: GaifoConfig = field(default_factory=GaifoConfig)
-    """GAIfO's discriminator."""
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import re
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 from bootifol.errors import BootifolError
+from bootifol.types import StepMetrics
 
 
 @dataclass
@@ -47,6 +49,20 @@ class Counters:
     @property
     def seconds(self) -> float:
         return self.alignment_seconds + self.interactive_seconds + self.cloning_seconds
+
+
+@dataclass(frozen=True)
+class PhaseStep:
+    """What a phase tells the trainer after each of its steps."""
+
+    count: int
+    """How far the phase is, as its log lines count it: in gradient steps or agent steps."""
+    done: int
+    """How far it is in the unit of its progress bar."""
+    metrics: Sequence[StepMetrics]
+    """Of each update since the last step."""
+    log_is_due: bool
+    """Whether a line of means is to be logged now."""
 
 
 class Stopwatch:

@@ -14,7 +14,7 @@ import numpy as np
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import RewardModel
-from bootifol.training.budget import Budget, Counters, Stopwatch
+from bootifol.training.budget import Budget, Counters, PhaseStep, Stopwatch
 from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.types import StepMetrics
 
@@ -30,7 +30,8 @@ def cloning_phase(
     rng: np.random.Generator,
     budget: Budget,
     counters: Counters,
-) -> Iterator[StepMetrics]:
+    log_every: int,
+) -> Iterator[PhaseStep]:
     """Learns the inverse dynamics, infers the videos' actions and rewards, and clones them.
 
     Args:
@@ -41,42 +42,53 @@ def cloning_phase(
         rng: draws batches and references.
         budget: where it limits the time, the phase ends with its share of it, and a run whose time is over ends it.
         counters: those of Cloning Phases are kept up to date.
+        log_every: steps from one log line to the next.
 
     Yields:
-        The metrics of each step; a video whose actions and rewards were inferred has none.
+        Each step; one in which a video's actions and rewards were inferred has no metrics.
     """
     watch = Stopwatch()
     demonstrations.fill()
     config = demonstrations.config
     inferring = config.inverse_dynamics_updates
-    cloning = inferring + len(demonstrations)
+    cloning, total = inferring + len(demonstrations), steps_of_a_phase(demonstrations)
     if not cloning_in_progress(demonstrations, counters):
         counters.cloning_phases += 1
         counters.cloning_began_at = counters.agent_steps
         counters.cloning_seconds_before = counters.cloning_seconds
-    earlier = (counters.cloning_phases - 1) * steps_of_a_phase(demonstrations)
+    earlier = (counters.cloning_phases - 1) * total
+    unlogged = 0
     while not budget.ended(counters) and cloning_in_progress(demonstrations, counters):
         metrics: StepMetrics = {}
         step, time_passed = counters.cloning_steps - earlier, budget.cloning_passed(counters)
         if step < inferring:
+            # The inverse dynamics learns from the agent's own steps.
             part_passed = min(time_passed / INVERSE_DYNAMICS_TIME, 1.0)
             rate = one_cycle(step, inferring, part_passed) * config.inverse_dynamics_learning_rate
             policy_steps = counters.agent_steps - agent.config.warm_up_steps
             metrics = demonstrations.learn_inverse_dynamics(agent_replay, policy_steps, rng, rate)
             last = inferring
         elif step < cloning:
+            # A video gets the actions and rewards that are seen in it now.
             demonstrations.infer(step - inferring, reward_model, rng)
             part_passed, last = 0.0, cloning
         else:
+            # The policy learns to do what was inferred.
             part_passed = max((time_passed - INVERSE_DYNAMICS_TIME) / (1 - INVERSE_DYNAMICS_TIME), 0.0)
             rate = one_cycle(step - cloning, config.cloning_updates, part_passed)
             rate *= config.cloning_learning_rate
             metrics = agent.clone(demonstrations.sample(agent.config.batch_size, rng), rate)
-            last = steps_of_a_phase(demonstrations)
+            last = total
         counters.cloning_steps = earlier + (step + 1 if part_passed < 1 else last)
         counters.cloning_gradient_steps += bool(metrics)
         counters.cloning_seconds += watch.lap()
-        yield metrics
+        done = counters.cloning_steps - earlier
+        counters.to_evaluate = int(done == total)  # also where the run is stopped just now
+        unlogged += bool(metrics)
+        log_is_due = unlogged > 0 and (done % log_every == 0 or done == total)
+        if log_is_due:
+            unlogged = 0
+        yield PhaseStep(counters.cloning_gradient_steps, done, [metrics], log_is_due)
 
 
 def one_cycle(done: int, steps: int, time_passed: float = 0.0) -> float:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from bootifol.envs.pixels import PixelEnvironment
 from bootifol.envs.rollout import Act
 from bootifol.evaluation.ranking import (
     EXPERT_ABOVE_RANDOM,
@@ -25,9 +24,10 @@ from bootifol.evaluation.summary import summarize
 from bootifol.evaluation.tables import EvaluationRow, append_evaluations, append_ranking
 from bootifol.experts import make_expert, make_random
 from bootifol.progress import progress
-from bootifol.rewards.references import draw_references
+from bootifol.rewards.references import draw_references, reference_rng
 from bootifol.training.budget import Budget, Counters
-from bootifol.training.build import Components, Demos, build_environment, reference_rng
+from bootifol.training.build import Parts, build_environment
+from bootifol.training.interruption import Interruption
 from bootifol.training.run_config import RunConfig
 from bootifol.types import Action, Metrics, Observation, Rewards, Video
 
@@ -38,36 +38,34 @@ class Evaluator:
     Args:
         run: what it is.
         directory: where it writes.
-        demos: held-out videos, and the expert's, which rewards compare with.
-        environment: for the showcase; evaluations make their own.
-        components: the policy and the reward that are measured.
+        parts: the policy and the reward that are measured; held-out videos, and the expert's, which rewards compare
+            with; the environment is for the showcase, evaluations make their own.
         budget: where schedules stand.
         counters: how far the run is.
         console: where sentences go.
         log: takes agent steps and metrics.
-        stop_if_requested: called wherever a measurement can be left off, which it then does by raising `Stopped`;
-            nothing of that measurement is written.
+        interruption: where the run is asked to stop, a measurement is left off; nothing of it is written.
     """
 
     def __init__(
         self,
         run: RunConfig,
         directory: Path,
-        demos: Demos,
-        environment: PixelEnvironment,
-        components: Components,
+        parts: Parts,
         budget: Budget,
         counters: Counters,
         console: Console,
         log: Callable[[int, Metrics], None],
-        stop_if_requested: Callable[[], None] = lambda: None,
+        interruption: Interruption,
     ) -> None:
         self._run, self._directory = run, directory
-        self._task, self._config = run.resolved_task(), run.training.evaluation
-        self._demos, self._environment, self._components = demos, environment, components
+        self._task, self._config = parts.task, run.training.evaluation
+        self._environment, self._expert = parts.environment, parts.demos.expert
+        self._held_out, self._agent_videos = parts.demos.held_out, parts.agent_videos
+        self._agent, self._reward_model = parts.agent, parts.reward_model
         self._budget, self._counters = budget, counters
         self._console, self._log = console, log
-        self._stop_if_requested = stop_if_requested
+        self._interruption = interruption
         self.newest: dict[str, float] = {}
         """Returns of the newest evaluation, by name."""
 
@@ -97,7 +95,7 @@ class Evaluator:
         self, episode_steps: int, seeds: Sequence[int], description: str | None = None
     ) -> list[EvaluationRow]:
         """Plays episodes without noise."""
-        agent, counters = self._components.agent, self._counters
+        agent, counters = self._agent, self._counters
         environment = build_environment(self._run, episode_steps)
         steps = self._budget.scheduled_steps(counters)
 
@@ -133,34 +131,33 @@ class Evaluator:
 
     def _until_stopped(self, act: Act) -> Act:
         def stoppable(observation: Observation) -> Action:
-            self._stop_if_requested()
+            self._interruption.stop_if_requested()
             return act(observation)
 
         return stoppable
 
     def _one_by_one(self, videos: Iterable[Video]) -> Iterator[Video]:
         for video in videos:
-            self._stop_if_requested()
+            self._interruption.stop_if_requested()
             yield video
 
     def rank(self) -> None:
         """Appends the rewards of held-out videos, and of the agent's newest ones, to `ranking.csv`."""
-        if not self._demos.held_out or self._components.reward_model.reads_environment_reward:
+        if not self._held_out or self._reward_model.reads_environment_reward:
             return
-        videos: dict[str, list[Video]] = dict(self._demos.held_out)
-        agent_videos = self._components.agent_videos
-        if len(agent_videos):
+        videos: dict[str, list[Video]] = dict(self._held_out)
+        if len(self._agent_videos):
             # Sums are compared, so of as many frames as the held-out videos have, where the agent's have more.
-            frames = len(self._demos.held_out["expert"][0].frames) if "expert" in videos else None
+            frames = len(self._held_out["expert"][0].frames) if "expert" in videos else None
             videos["agent"] = [
-                _cut(video, frames) for video in agent_videos.newest(self._config.held_out_videos)
+                _cut(video, frames) for video in self._agent_videos.newest(self._config.held_out_videos)
             ]
         sees = self._sight()
         figures = {f"sight/{name}": value for name, value in sees.items()}
         rows = rank_videos(
-            self._components.reward_model,
+            self._reward_model,
             {kind: self._one_by_one(of_kind) for kind, of_kind in videos.items()},
-            self._demos.expert,
+            self._expert,
             reference_rng(self._run.seed, self._counters.agent_steps),
             self._counters.agent_steps,
         )
@@ -186,7 +183,7 @@ class Evaluator:
         episodes = self._config.sight_episodes
         if not (episodes and self._task.has_expert):
             return {}
-        model, expert = self._components.reward_model, self._demos.expert
+        model, expert = self._reward_model, self._expert
         rng = reference_rng(self._run.seed, self._counters.agent_steps)
 
         def label(video: Video) -> Rewards:
@@ -195,7 +192,7 @@ class Evaluator:
         performances = []
         for performance in perform(self._run.task, self._environment, label, episodes):
             performances.append(performance)
-            self._stop_if_requested()
+            self._interruption.stop_if_requested()
         return sight(performances)
 
     def sample_episodes(self) -> None:
@@ -203,7 +200,7 @@ class Evaluator:
         count = self._config.showcase_episodes
         if not count:
             return
-        agent, steps = self._components.agent, self._budget.scheduled_steps(self._counters)
+        agent, steps = self._agent, self._budget.scheduled_steps(self._counters)
         acts: dict[str, Act] = {
             "agent": lambda observation: agent.act(observation, steps, explore=False),
             "random": make_random(self._environment, self._run.seed),
@@ -214,8 +211,8 @@ class Evaluator:
             self._environment,
             {who: self._until_stopped(act) for who, act in acts.items()},
             evaluation_seeds(self._run.seed, count),
-            self._components.reward_model,
-            self._demos.expert,
+            self._reward_model,
+            self._expert,
             reference_rng(self._run.seed, self._counters.agent_steps),
             self._counters.agent_steps,
         )

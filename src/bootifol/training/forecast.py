@@ -11,12 +11,7 @@ from bootifol.envs.rollout import EpisodeRecorder, rollout
 from bootifol.progress import duration
 from bootifol.rewards.base import SeesFrames
 from bootifol.training.budget import Budget, Counters
-from bootifol.training.build import (
-    Components,
-    build_agent,
-    build_environment,
-    build_replay,
-)
+from bootifol.training.build import Parts, build_agent, build_environment, build_replay
 from bootifol.training.config import TrainingConfig
 from bootifol.training.run_config import RunConfig
 
@@ -75,29 +70,25 @@ class Forecast:
         )
 
 
-def forecast(run: RunConfig, components: Components, budget: Budget, counters: Counters) -> Forecast:
+def forecast(run: RunConfig, parts: Parts, budget: Budget, counters: Counters) -> Forecast:
     """Measures what steps and updates cost, in an environment and with an agent that are thrown away.
 
     Args:
-        run: what it is; its `time_budget` is set.
-        components: of the run, which are only looked at.
-        budget: of the run.
+        run: what it is.
+        parts: of the run, which are only looked at.
+        budget: of the run, with a limit of time.
         counters: after the Alignment Phase.
     """
     config = run.training
     seconds = budget.seconds_left(counters)
-    if components.demonstrations is not None:
+    if parts.demonstrations is not None:
         seconds -= budget.cloning_share * config.demonstrations.phases * (budget.seconds or 0.0)
-    costs = measured_costs(run, components, counters)
-    steps = affordable_steps(costs, config, max(seconds, 0.0), evaluated_steps(run))
+    costs = measured_costs(run, parts, counters)
+    task, evaluation = parts.task, config.evaluation
+    evaluated = evaluation.episodes * task.episode_steps + evaluation.long_episodes * task.evaluation_steps
+    steps = affordable_steps(costs, config, max(seconds, 0.0), evaluated)
     updates = max(steps - config.agent.warm_up_steps, 0) // config.agent.update_every
     return Forecast(max(seconds, 0.0), steps, updates, budget.agent_steps)
-
-
-def evaluated_steps(run: RunConfig) -> int:
-    """Agent steps of one evaluation on the way."""
-    task, config = run.resolved_task(), run.training.evaluation
-    return config.episodes * task.episode_steps + config.long_episodes * task.evaluation_steps
 
 
 def affordable_steps(costs: Costs, config: TrainingConfig, seconds: float, evaluated: int) -> int:
@@ -120,12 +111,12 @@ def affordable_steps(costs: Costs, config: TrainingConfig, seconds: float, evalu
     return int(warm_up / (costs.agent_step * steps) + learned)
 
 
-def measured_costs(run: RunConfig, components: Components, counters: Counters) -> Costs:
+def measured_costs(run: RunConfig, parts: Parts, counters: Counters) -> Costs:
     """Acts for a few steps from random parameters, and learns from them a few times."""
-    config, length = run.training, run.resolved_task().episode_steps
+    config, length = run.training, parts.task.episode_steps
     environment = build_environment(run, length)
     try:
-        agent = build_agent(run, environment, components.reward_model)
+        agent = build_agent(run, environment, parts.reward_model)
         recorder = EpisodeRecorder("timing")
         steps = rollout(environment, lambda seen: agent.act(seen, 0, explore=True), 0)
         began = time.perf_counter()
@@ -137,9 +128,9 @@ def measured_costs(run: RunConfig, components: Components, counters: Counters) -
     finally:
         environment.close()
     episode = recorder.episode()
-    if components.featurizer is not None:
-        episode = replace(episode, video=components.featurizer.with_features(episode.video))
-    replay = build_replay(run, components.reward_model, length + 1, episode.actions.shape[1])
+    if parts.featurizer is not None:
+        episode = replace(episode, video=parts.featurizer.with_features(episode.video))
+    replay = build_replay(run, parts.reward_model, length + 1, episode.actions.shape[1])
     replay.add(episode, np.zeros(len(episode.actions), np.float32))
     rng = np.random.default_rng(0)
     for update in range(1 + UPDATES):
@@ -149,6 +140,6 @@ def measured_costs(run: RunConfig, components: Components, counters: Counters) -
     update_cost = (time.perf_counter() - began) / UPDATES
     # The Alignment Phase's gradient steps are as large; a head on states is smaller than an update of the agent.
     reward_update = counters.alignment_seconds / max(counters.alignment_steps, 1)
-    if isinstance(components.reward_model, SeesFrames):
+    if isinstance(parts.reward_model, SeesFrames):
         reward_update = min(reward_update, update_cost)
     return Costs(agent_step, update_cost, reward_update)

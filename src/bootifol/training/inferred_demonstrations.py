@@ -12,8 +12,7 @@ most of them are drawn from where the picture moves ("copycat" policies: Wen et 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -22,71 +21,15 @@ from numpy.typing import NDArray
 
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.envs.pictures import resize
-from bootifol.errors import fields_of, require_at_least, require_below_one, require_positive, require_share
 from bootifol.progress import progress
 from bootifol.replay.buffer import ReplayBuffer
 from bootifol.rewards.base import Featurizer, RewardModel
 from bootifol.rewards.references import draw_references
+from bootifol.training.config import DemonstrationConfig
 from bootifol.types import Arrays, Batch, Episode, Frames, FrameStates, StepMetrics, Video, VideoSource
 
 MOVING = 0.1
 """A picture moves where it changes by more than this share of its video's largest change."""
-
-
-@dataclass(frozen=True)
-class DemonstrationConfig:
-    """Expert videos as the agent's experience (beyond the paper)."""
-
-    share: float = 0.0
-    """Share of each batch that is drawn from expert videos; 0, as in the paper, uses none."""
-
-    videos: int = 1000
-    """Expert videos used so, at most; they take replay's memory a second time."""
-
-    moving_share: float = 0.8
-    """Share of the transitions drawn from expert videos in which the picture moves."""
-
-    history_dropout: float = 0.8
-    """Share of the observations drawn from expert videos whose stack repeats its newest frame."""
-
-    policy_share: float = 0.5
-    """Share of the inverse dynamics' batches from steps after the warm-up, as soon as there are any: the policy moves
-    more like the expert than random actions do. The rest comes from all steps."""
-
-    inverse_dynamics_updates: int = 1500
-    """Gradient steps of the inverse dynamics in each Cloning Phase; the first comes when the agent's warm-up ends."""
-
-    inverse_dynamics_learning_rate: float = 5e-4
-    """Of Adam at its highest: in each phase it rises for a twentieth of the gradient steps and falls to 0."""
-
-    cloning_updates: int = 4000
-    """Gradient steps of encoder and actor towards the inferred actions in each Cloning Phase."""
-
-    cloning_learning_rate: float = 1e-3
-    """Of Adam at its highest, rising and falling likewise."""
-
-    phases: int = 3
-    """Cloning Phases of a run."""
-
-    time_share: float = 0.25
-    """With a time budget, the largest share of it that all Cloning Phases together may take, each as much as any other:
-    what is left of its gradient steps then is left out."""
-
-    repeat_every: int = 1500
-    """Agent steps from one Cloning Phase to the next: steps of a policy that moves like the expert teach the inverse
-    dynamics what random ones cannot, and every demonstration gets its actions and rewards anew."""
-
-    batch_size: int = 128
-    """Transitions of a gradient step of the inverse dynamics."""
-
-    def __post_init__(self) -> None:
-        of_self = partial(fields_of, "demonstrations", self)
-        require_below_one(**of_self("share"))
-        require_share(**of_self("moving_share", "history_dropout", "policy_share", "time_share"))
-        counts = ("videos", "inverse_dynamics_updates", "phases", "repeat_every", "batch_size")
-        require_at_least(1, **of_self(*counts))
-        require_at_least(0, **of_self("cloning_updates"))
-        require_positive(**of_self("inverse_dynamics_learning_rate", "cloning_learning_rate"))
 
 
 class Demonstrations:

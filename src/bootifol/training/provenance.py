@@ -9,8 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TypedDict
 
-from bootifol.demos.demo_set import find_demo_sets
-from bootifol.demos.manifest import read_manifest
+from bootifol.demos.manifest import find_demo_sets, read_manifest
 from bootifol.errors import BootifolError
 
 _PACKAGES = (

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import gymnasium
+
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.policy import Policy, PolicyConfig, read_policy, write_policy
 from bootifol.envs.pixels import PixelEnvironment
 from bootifol.errors import BootifolError
 from bootifol.hub import fetched_file, hub_address, is_hub_address
-from bootifol.training.build import build_agent, build_environment, build_reward_model, reads_pictures
+from bootifol.tasks import Task
+from bootifol.training.build import Parts, build_agent, build_environment, build_reward_model
 from bootifol.training.checkpoint import Progress, load_checkpoint, newest_checkpoint
 from bootifol.training.run_config import RunConfig
 from bootifol.types import AnyPath
@@ -49,26 +52,24 @@ def load_policy(run: AnyPath, trust: bool = False) -> Policy:
         agent, progress = restored_agent(config, path, environment)
         return Policy(
             lambda observation: agent.act(observation, 0, explore=False),
-            _policy_config(config, environment, progress.counters.agent_steps),
+            _policy_config(config, config.resolved_task(), environment, progress.counters.agent_steps),
         )
     finally:
         environment.close()
 
 
-def save_policy(
-    directory: Path, run: RunConfig, environment: PixelEnvironment, agent: DrQv2, agent_steps: int
-) -> None:
+def save_policy(directory: Path, run: RunConfig, parts: Parts, agent_steps: int) -> None:
     """Writes a run's policy, unless it acts on encodings of a reward model that goes on learning.
 
     Args:
         directory: of the run.
         run: its configuration.
-        environment: that it acts in.
-        agent: that it trains.
+        parts: its agent, and the environment that it acts in.
         agent_steps: of training so far.
     """
     if run.training.agent.observations != "encodings":
-        write_policy(directory / NAME, _policy_config(run, environment, agent_steps), agent)
+        config = _policy_config(run, parts.task, parts.environment, agent_steps)
+        write_policy(directory / NAME, config, parts.agent)
 
 
 def restored_agent(run: RunConfig, directory: Path, environment: PixelEnvironment) -> tuple[DrQv2, Progress]:
@@ -79,8 +80,9 @@ def restored_agent(run: RunConfig, directory: Path, environment: PixelEnvironmen
     """
     checkpoint = require_checkpoint(directory)
     # Others act without it, so a backbone or a module of one's own may be missing.
-    reward_model = None if reads_pictures(run) else build_reward_model(run)
-    if reward_model is not None:
+    reward_model = None
+    if run.training.agent.observations != "pictures":
+        reward_model = build_reward_model(run)
         load_checkpoint(checkpoint, {"reward_model": reward_model})
     agent = build_agent(run, environment, reward_model)
     return agent, load_checkpoint(checkpoint, {"agent": agent})
@@ -98,14 +100,15 @@ def require_checkpoint(directory: Path) -> Path:
     return checkpoint
 
 
-def _policy_config(run: RunConfig, environment: PixelEnvironment, agent_steps: int) -> PolicyConfig:
-    shape = environment.action_space.shape
-    assert shape is not None
+def _policy_config(
+    run: RunConfig, task: Task, environment: PixelEnvironment, agent_steps: int
+) -> PolicyConfig:
+    assert isinstance(environment.action_space, gymnasium.spaces.Box)
     return PolicyConfig(
         task=run.task,
         agent_steps=agent_steps,
-        action_dim=shape[0],
-        action_repeat=run.resolved_task().action_repeat,
+        action_dim=environment.action_space.shape[0],
+        action_repeat=task.action_repeat,
         frames_per_second=environment.metadata["render_fps"],
         pictures=run.training.pictures,
     )
