@@ -28,6 +28,7 @@ from bootifol.reports.plots import RunLook, common_length, looks_of
 from bootifol.reports.result_tables import fixed_number
 from bootifol.reports.run_files import COUNTERS, RunFiles, flattened
 from bootifol.reports.style import KIND_COLORS, svg_data_uri, thousands
+from bootifol.rewards.config import CAPTIONS
 from bootifol.types import AnyPath
 
 SHOWN_STARTS = 4
@@ -86,76 +87,6 @@ class RunSection:
     losses: Sequence[Card]
     other_metrics: Sequence[Card]
     config: Sequence[tuple[str, str]]
-
-
-LOSSES = {
-    "loss/multiview": (
-        "L_S: two views agree",
-        "Tells whether the lightness and the color of one frame are recognized as belonging together. "
-        "Healthy: falls fast, then levels off.",
-    ),
-    "loss/triplet": (
-        "L_triplet: near in time, near in space",
-        "Neighboring frames should lie closer than distant ones. Healthy: falls far below 1, its value for an "
-        "encoder that sees no difference; 0 means the margin is met everywhere.",
-    ),
-    "loss/autoencoder": (
-        "L_ae: pictures can be redrawn",
-        "Squared error of the redrawn frame. Healthy: falls steadily; a plateau at the start means a blank picture.",
-    ),
-    "loss/prediction": (
-        "L_Z: the next state is foreseen",
-        "The next states, predicted from the past, against the other frames of the video. Healthy: falls and stays "
-        "low; a rise in the Interactive Phase means the agent does new things.",
-    ),
-    "loss/sequence": (
-        "L_O: expert and other videos are told apart",
-        "The contrast that makes the reward. Healthy: falls in alignment, and rises again while interacting, "
-        "because the agent's videos come to look like the expert's. At 0 it teaches nothing more.",
-    ),
-    "loss/sequence_triplet": (
-        "L_SNS: alike videos are near, others far",
-        "Distances between encodings of whole videos, which make the reward with those of frames. Healthy: starts at "
-        "1, since all encodings are nearly one, and falls clearly below it.",
-    ),
-    "loss/frame_triplet": (
-        "L_SNI: alike frames are near, others far",
-        "The same of single frames. Healthy: falls where a single frame tells expert from agent, and stays near 1 "
-        "where it does not.",
-    ),
-    "loss/sequence_reconstruction": (
-        "L_RAES: videos can be redrawn",
-        "Squared error of frames unrolled from the encoding of their video. Healthy: falls fast, then slowly.",
-    ),
-    "loss/frame_reconstruction": (
-        "L_VAEI: frames can be redrawn",
-        "Squared error of a frame redrawn from its own encoding. Healthy: falls fast, then slowly.",
-    ),
-    "loss/translation": (
-        "L_trans: videos shown in the context of another",
-        "Squared error of the translated frame. Healthy: falls, rests while all translations are one blurred picture, "
-        "and falls again.",
-    ),
-    "loss/reconstruction": (
-        "L_rec: features can be drawn",
-        "Squared error of a frame drawn from its own features. Healthy: falls with L_trans; equal to it, features "
-        "say nothing yet.",
-    ),
-    "loss/alignment": (
-        "L_align: translated and true features agree",
-        "What makes their distance a reward. Healthy: rises when features begin to say something, then falls.",
-    ),
-    "loss/discriminator": (
-        "L_D: expert and other stacks of frames are told apart",
-        "What the discriminator does not know yet. Healthy: falls from 2 log 2 = 1.39; near 0 while the agent acts, "
-        "the discriminator has won and its reward says little.",
-    ),
-    "loss/total": (
-        "All losses together",
-        "The weighted sum that is minimized. Healthy: falls at first and has no sudden jumps afterwards.",
-    ),
-}
-"""Title and caption of each loss."""
 
 
 def report(run_dirs: Sequence[AnyPath], out: AnyPath) -> Path:
@@ -316,7 +247,7 @@ def _curve_cards(looks: Sequence[RunLook]) -> list[Card]:
 def _loss_cards(looks: Sequence[RunLook]) -> list[Card]:
     return [
         card
-        for name, (title, caption) in LOSSES.items()
+        for name, (title, caption) in CAPTIONS.items()
         for card in _card(title, plots.loss_curves(looks, name), caption)
     ]
 
@@ -362,7 +293,7 @@ def _ranking_cards(run: RunFiles) -> list[Card]:
 
 
 def _other_cards(looks: Sequence[RunLook]) -> list[Card]:
-    shown = {"episode/learned_reward", *LOSSES}
+    shown = {"episode/learned_reward", *CAPTIONS}
     cards = []
     for phase, name in sorted(looks[0].run.curves):
         if name not in shown and not name.startswith("sight/"):

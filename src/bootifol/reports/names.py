@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from bootifol.reports.run_files import RunFiles, flattened
+from bootifol.rewards.config import NAMES
 from bootifol.tasks import short_name
 
 METHOD_NAMES = {
-    "bootifol": "BootIfOL",
-    "virl": "ViRL",
-    "context_translation": "CT",
-    "gaifo": "GAIfO",
+    **NAMES,
     "environment": "True reward",
     "random": "Random",
     "expert": "Expert",

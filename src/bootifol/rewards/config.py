@@ -1,13 +1,39 @@
-"""The settings of all reward methods. Who reads them needs none of the methods."""
+"""The settings of all reward methods, and what these and their losses are called. Who reads them needs no method."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from bootifol.rewards.bootifol import config as bootifol
 from bootifol.rewards.bootifol.config import BootifolConfig
+from bootifol.rewards.bootifol.frames import config as frames
+from bootifol.rewards.context_translation import config as context_translation
 from bootifol.rewards.context_translation.config import ContextTranslationConfig
+from bootifol.rewards.gaifo import config as gaifo
 from bootifol.rewards.gaifo.config import GaifoConfig
+from bootifol.rewards.virl import config as virl
 from bootifol.rewards.virl.config import VirlConfig
+
+NAMES = {
+    "bootifol": bootifol.NAME,
+    "virl": virl.NAME,
+    "context_translation": context_translation.NAME,
+    "gaifo": gaifo.NAME,
+}
+"""Of the methods in tables and figures."""
+
+CAPTIONS = {
+    **bootifol.CAPTIONS,
+    **frames.CAPTIONS,
+    **virl.CAPTIONS,
+    **context_translation.CAPTIONS,
+    **gaifo.CAPTIONS,
+    "loss/total": (
+        "All losses together",
+        "The weighted sum that is minimized. Healthy: falls at first and has no sudden jumps afterwards.",
+    ),
+}
+"""Title and caption of each loss."""
 
 
 @dataclass(frozen=True)

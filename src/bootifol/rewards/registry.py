@@ -1,6 +1,7 @@
 """The reward methods by name, and anyone's own as `MODULE:NAME` or from an installed package (docs/add_a_method.md).
 
-To add one to the library: a folder beside this file, a field of `RewardConfig` in `config.py` and an entry of METHODS.
+To add one to the library: a folder beside this file, whose configuration names it and its losses; its place in
+`config.py`; and an entry of METHODS.
 """
 
 from __future__ import annotations
@@ -36,6 +37,9 @@ class Method:
     section: str
     """Which section."""
 
+    backbone: Callable[..., str | None] = lambda section: None
+    """Which frozen network's features it reads instead of pixels, by its section; None where it reads pixels."""
+
 
 def make_bootifol(config: BootifolConfig, video_size: int, seed: int, device: str = "cpu") -> RewardModel:
     """BootIfOL's reward model: of sequences, as in the paper, or of single frames."""
@@ -58,6 +62,7 @@ METHODS = {
         "contrastive learning, bootstrapped on the agent's own failures (Djeafea Sonwa et al., 2022)",
         make_bootifol,
         "bootifol",
+        lambda section: section.backbone,
     ),
     "virl": Method(
         "siamese recurrent networks, trained only while the agent acts (Berseth and Pal, 2019)",
@@ -112,10 +117,11 @@ def make_backbone(method: str, config: RewardConfig, video_size: int, device: st
     Raises:
         BootifolError: the backbone cannot be loaded, or cannot read videos of that size.
     """
-    own = config.bootifol
-    if method != "bootifol" or own.backbone is None:
+    if method not in METHODS:
         return None
-    return load_backbone(own.backbone, video_size, own.precision, device)
+    section = getattr(config, METHODS[method].section)
+    name = METHODS[method].backbone(section)
+    return None if name is None else load_backbone(name, video_size, section.precision, device)
 
 
 def make_reward_model(

@@ -16,6 +16,37 @@ from bootifol.errors import (
 )
 from bootifol.rewards.bootifol.frames.config import FrameConfig
 
+NAME = "BootIfOL"
+"""In tables and figures, as the paper has it."""
+
+CAPTIONS = {
+    "loss/multiview": (
+        "L_S: two views agree",
+        "Tells whether the lightness and the color of one frame are recognized as belonging together. "
+        "Healthy: falls fast, then levels off.",
+    ),
+    "loss/triplet": (
+        "L_triplet: near in time, near in space",
+        "Neighboring frames should lie closer than distant ones. Healthy: falls far below 1, its value for an "
+        "encoder that sees no difference; 0 means the margin is met everywhere.",
+    ),
+    "loss/autoencoder": (
+        "L_ae: pictures can be redrawn",
+        "Squared error of the redrawn frame. Healthy: falls steadily; a plateau at the start means a blank picture.",
+    ),
+    "loss/prediction": (
+        "L_Z: the next state is foreseen",
+        "The next states, predicted from the past, against the other frames of the video. Healthy: falls and stays "
+        "low; a rise in the Interactive Phase means the agent does new things.",
+    ),
+    "loss/sequence": (
+        "L_O: expert and other videos are told apart",
+        "The contrast that makes the reward. Healthy: falls in alignment, and rises again while interacting, "
+        "because the agent's videos come to look like the expert's. At 0 it teaches nothing more.",
+    ),
+}
+"""Title and caption of each loss, for the report."""
+
 
 @dataclass(frozen=True)
 class BootifolConfig:

@@ -15,6 +15,27 @@ from bootifol.errors import (
     require_positive,
 )
 
+NAME = "CT"
+"""In tables and figures, as the paper has it."""
+
+CAPTIONS = {
+    "loss/translation": (
+        "L_trans: videos shown in the context of another",
+        "Squared error of the translated frame. Healthy: falls, rests while all translations are one blurred picture, "
+        "and falls again.",
+    ),
+    "loss/reconstruction": (
+        "L_rec: features can be drawn",
+        "Squared error of a frame drawn from its own features. Healthy: falls with L_trans; equal to it, features "
+        "say nothing yet.",
+    ),
+    "loss/alignment": (
+        "L_align: translated and true features agree",
+        "What makes their distance a reward. Healthy: rises when features begin to say something, then falls.",
+    ),
+}
+"""Title and caption of each loss, for the report."""
+
 
 @dataclass(frozen=True)
 class ContextTranslationConfig:

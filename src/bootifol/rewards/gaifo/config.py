@@ -15,6 +15,18 @@ from bootifol.errors import (
     require_positive,
 )
 
+NAME = "GAIfO"
+"""In tables and figures, as the paper has it."""
+
+CAPTIONS = {
+    "loss/discriminator": (
+        "L_D: expert and other stacks of frames are told apart",
+        "What the discriminator does not know yet. Healthy: falls from 2 log 2 = 1.39; near 0 while the agent acts, "
+        "the discriminator has won and its reward says little.",
+    ),
+}
+"""Title and caption of each loss, for the report."""
+
 
 @dataclass(frozen=True)
 class GaifoConfig:

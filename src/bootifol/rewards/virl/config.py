@@ -16,6 +16,31 @@ from bootifol.errors import (
     require_share,
 )
 
+NAME = "ViRL"
+"""In tables and figures, as the paper has it."""
+
+CAPTIONS = {
+    "loss/sequence_triplet": (
+        "L_SNS: alike videos are near, others far",
+        "Distances between encodings of whole videos, which make the reward with those of frames. Healthy: starts at "
+        "1, since all encodings are nearly one, and falls clearly below it.",
+    ),
+    "loss/frame_triplet": (
+        "L_SNI: alike frames are near, others far",
+        "The same of single frames. Healthy: falls where a single frame tells expert from agent, and stays near 1 "
+        "where it does not.",
+    ),
+    "loss/sequence_reconstruction": (
+        "L_RAES: videos can be redrawn",
+        "Squared error of frames unrolled from the encoding of their video. Healthy: falls fast, then slowly.",
+    ),
+    "loss/frame_reconstruction": (
+        "L_VAEI: frames can be redrawn",
+        "Squared error of a frame redrawn from its own encoding. Healthy: falls fast, then slowly.",
+    ),
+}
+"""Title and caption of each loss, for the report."""
+
 
 @dataclass(frozen=True)
 class VirlConfig:

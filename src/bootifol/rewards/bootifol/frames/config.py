@@ -8,6 +8,32 @@ from typing import Literal
 
 from bootifol.errors import fields_of, require_at_least, require_choices, require_positive, require_share
 
+CAPTIONS = {
+    "loss/frame": (
+        "L_F: the expert's frames are told from others",
+        "Healthy: falls below 0.4 once the goal is seen. Early frames that count in part keep it above 0.",
+    ),
+    "loss/episode": (
+        "L_E: what stays through an episode is told apart",
+        "Two moments of a video against other videos. Healthy: falls far where goals differ, little where nothing but "
+        "the start does.",
+    ),
+    "loss/time": (
+        "L_T: moments of a video are told apart",
+        "Neighboring frames against other moments of the same video. Healthy: falls steadily.",
+    ),
+    "loss/exchange": (
+        "L_X: halves of two videos do not go together",
+        "An expert's motion with another video's goal is a failure. Healthy: falls where goals differ.",
+    ),
+    "loss/bootstrap": (
+        "L_B: the agent's frames lose",
+        "The mean chance that the head gives the agent's frames. Healthy: falls at first, and rises as the agent gets "
+        "better.",
+    ),
+}
+"""Title and caption of each loss, for the report."""
+
 
 @dataclass(frozen=True)
 class FrameConfig:
