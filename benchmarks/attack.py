@@ -416,7 +416,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, default=Path("results/attack.csv"))
-    parser.add_argument("--share", type=float, default=1.0, help="of the tries, for a quick look")
+    parser.add_argument("--fraction", type=float, default=1.0, help="of the tries, for a quick look")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
         "--only", nargs="+", default=[], help="words of the promises to try; the table's other rows stay"
@@ -431,7 +431,7 @@ def main() -> int:
         for promise, (run, tries) in ATTACKS.items():
             if arguments.only and not any(word in promise for word in arguments.only):
                 continue
-            done, held = run(attack, max(1, round(arguments.share * tries)))
+            done, held = run(attack, max(1, round(arguments.fraction * tries)))
             rows[promise] = {"promise": promise, "tries": str(done), "held": str(held)}
             write_rows(arguments.out, COLUMNS, [rows[name] for name in ATTACKS if name in rows])
             print(f"{promise}: {held} of {done}", flush=True)

@@ -39,7 +39,7 @@ VARIANTS = {
     "moving, 80 % without history": (0.8, 0.8),
     "moving, all without history": (0.8, 1.0),
 }
-"""Share of the transitions in which the picture moves (None: as they come), and of the stacks without history."""
+"""Fraction of the transitions in which the picture moves (None: as they come), and of the stacks without history."""
 COLUMNS = ("variant", "seed", "updates", "cloning_loss", "mean_return", "episodes_above_half")
 
 
@@ -101,7 +101,7 @@ def cloned(
     variant: str, episodes: list[Episode], config: TrainingConfig, arguments: argparse.Namespace
 ) -> dict[str, str]:
     """One clone and what it earns."""
-    moving_share, history_dropout = VARIANTS[variant]
+    moving_fraction, history_dropout = VARIANTS[variant]
     size, stack, steps = config.pictures.agent_size, config.pictures.stack, episodes[0].agent_steps
     action_dim = episodes[0].actions.shape[1]
     agent = DrQv2(config.agent, size, stack, action_dim, arguments.seed)
@@ -110,7 +110,10 @@ def cloned(
     )
     demonstrations = Demonstrations(
         DemonstrationConfig(
-            share=0.5, videos=len(episodes), moving_share=moving_share or 0.0, history_dropout=history_dropout
+            fraction=0.5,
+            videos=len(episodes),
+            moving_fraction=moving_fraction or 0.0,
+            history_dropout=history_dropout,
         ),
         Recorded(episodes),
         replay,
@@ -124,7 +127,7 @@ def cloned(
     losses = []
     with progress(f"cloning: {variant}", arguments.updates) as advance:
         for done in range(arguments.updates):
-            draw = replay.sample if moving_share is None else demonstrations.sample
+            draw = replay.sample if moving_fraction is None else demonstrations.sample
             learning_rate = demonstrations.config.cloning_learning_rate * one_cycle(done, arguments.updates)
             batch = draw(config.agent.batch_size, rng)
             losses.append(float(agent.clone(batch, learning_rate)["agent/cloning_loss"]))

@@ -10,7 +10,7 @@ mp4 above anything else. Each row of OUT.csv is a video; the tables that are pri
 
 - AUC: how often a better video is rewarded above a worse one, both as recorded (0.5: a coin);
 - crossed: how often a recorded expert video is above a random one through mp4 (0: only compression is read);
-- shift: how much mp4 adds to the reward of the same video, as a share of what tells expert from random.
+- shift: how much mp4 adds to the reward of the same video, as a fraction of what tells expert from random.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
     python -m benchmarks.diagnosis runs/reacher --out results/reacher_hard/diagnosis
 
 1. Does the reward rank performances it never saw, from the expert's down to random ones? Performers of every degree
-   play: the expert with a share of random actions, late, or with weak actions, and constant actions.
+   play: the expert with a fraction of random actions, late, or with weak actions, and constant actions.
 2. Does the agent follow the reward? Its own episodes stand among them; and does the reward tell those that reach the
    goal from those that do not? Where it cannot, it cannot lead the agent from one to the other.
 3. Is the reward stale? The rewards that replay holds, against what the newest reward would give the same episodes.

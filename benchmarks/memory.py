@@ -60,7 +60,7 @@ Measured = TypeVar("Measured")
 
 LIMIT = 8000 * MB
 SETTLED = 0.5
-"""Share of the agent steps before which memory may still grow."""
+"""Fraction of the agent steps before which memory may still grow."""
 
 SMALL_RUN = """
     --preset smoke --threads 1 --pictures.agent-size 32 --pictures.video-size 32 --agent.replay-capacity 350
@@ -126,7 +126,7 @@ def stores(run: RunConfig, action_dim: int) -> list[Reading]:
     config, frames = run.training, run.resolved_task().episode_steps + 1
     size, video_size = config.pictures.agent_size, config.pictures.video_size
     replays = {"replay": config.agent.replay_capacity}
-    if config.demonstrations.share > 0:
+    if config.demonstrations.fraction > 0:
         replays["demonstrations"] = config.demonstrations.videos * frames
     kept: list[object] = []
     readings = []

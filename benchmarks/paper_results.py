@@ -59,7 +59,7 @@ def rows_of(run: RunFiles) -> list[Row]:
         raise BootifolError(
             f"{run.path} has no evaluation with a scaled return: let it learn until its first one"
         )
-    cloned = float(run.config.get("demonstrations", {}).get("share", 0)) > 0
+    cloned = float(run.config.get("demonstrations", {}).get("fraction", 0)) > 0
     key = (run.task, system_of(run), str(int(cloned)), str(run.seed))
     rows = []
     for agent_steps, episodes in run.evaluations_of(lengths[-1]).items():

@@ -43,7 +43,7 @@ from bootifol.tasks import make_environment, task_named
 from bootifol.types import Frames
 
 KEPT = 0.25
-"""Share of the frames that are kept: neighbors look alike."""
+"""Fraction of the frames that are kept: neighbors look alike."""
 
 PLACES = {"hand": slice(0, 3), "object": slice(4, 7), "goal": slice(36, 39)}
 """Where they stand in Meta-World's observation, in meters."""

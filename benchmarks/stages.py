@@ -1,4 +1,4 @@
-"""Where does the time of a run go? What each stage costs, how often a run does it, and what share of the run that is.
+"""Where does the time of a run go? What each stage costs, how often it is done, and what fraction of the run that is.
 
     python -m benchmarks.stages --preset cpu --task reacher_hard --demos demos/reacher_hard
     python -m benchmarks.stages --demos demos/reacher_hard --config.agent.update-every 8   # any field of the preset
@@ -44,7 +44,7 @@ from bootifol.training.run_config import RunConfig
 from bootifol.training.trainer import Trainer
 from bootifol.types import Video
 
-HEADER = ("stage", "in a run", "ms each", "arithmetic ms", "ms an agent step", "share")
+HEADER = ("stage", "in a run", "ms each", "arithmetic ms", "ms an agent step", "fraction")
 
 HIGHEST_RATE = 1e-4
 """Learning rate of the timed steps of the Cloning Phase: what it is changes no time."""

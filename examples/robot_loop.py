@@ -72,10 +72,8 @@ class Pace:
     """Seconds that the latest one was late by."""
 
     def __str__(self) -> str:
-        share = self.late / max(self.actions, 1)
-        return (
-            f"{self.actions} actions, {self.late} late ({share:.0%}), by {1000 * self.worst:.0f} ms at worst"
-        )
+        fraction = self.late / max(self.actions, 1)
+        return f"{self.actions} actions, {self.late} late ({fraction:.0%}), by {1000 * self.worst:.0f} ms at worst"
 
 
 def act_on(

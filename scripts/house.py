@@ -45,7 +45,7 @@ def main() -> None:
     by_preset = [dict(leaves(config)) for config in PRESETS.values()]
     default = dict(leaves(type(SMOKE)()))
     unset = [name for name in settings if all(preset[name] == default[name] for preset in by_preset)]
-    documented, returning = shares()
+    documented, returning = fractions()
     rows = [
         ("lines of a training step", str(sum(step.values()))),
         ("its files", str(len(files))),
@@ -83,7 +83,7 @@ def training_step() -> Counter[tuple[Path, str]]:
         agent=replace(SMOKE.agent, encoder="strided", warm_up_steps=60, update_every=2, replay_capacity=600),
         alignment=replace(SMOKE.alignment, gradient_steps=2),
         interactive=replace(SMOKE.interactive, agent_steps=120, reward_update_every=20, agent_videos=6),
-        demonstrations=replace(SMOKE.demonstrations, share=0.0),
+        demonstrations=replace(SMOKE.demonstrations, fraction=0.0),
         evaluation=replace(SMOKE.evaluation, every=10_000),
     )
     called: set[tuple[str, int]] = set()
@@ -179,7 +179,7 @@ def rooms() -> Counter[str]:
     return lines
 
 
-def shares() -> tuple[float, float]:
+def fractions() -> tuple[float, float]:
     """Of public functions and classes, those with a docstring; of all functions, those with a return type."""
     told, typed = [], []
     for path in modules():

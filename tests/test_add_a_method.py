@@ -46,7 +46,14 @@ TINY = [
     *("--pictures.agent-size", "32", "--pictures.video-size", "32", "--agent.encoder", "strided"),
     *("--alignment.gradient-steps", "40", "--interactive.agent-steps", "120", "--evaluation.every", "120"),
     *("--agent.warm-up-steps", "60", "--agent.update-every", "20", "--agent.batch-size", "8"),
-    *("--interactive.log-every", "60", "--demonstrations.share", "0", "--evaluation.showcase-episodes", "1"),
+    *(
+        "--interactive.log-every",
+        "60",
+        "--demonstrations.fraction",
+        "0",
+        "--evaluation.showcase-episodes",
+        "1",
+    ),
 ]
 
 
@@ -140,7 +147,7 @@ def test_a_plan_carries_the_newest_frame_to_what_is_like_it(home: Path) -> None:
     # At frame 2 a third of the expert's mass lies on y, and the three frames at x share its cost.
     late = newest_costs(torch.stack([x, x, x, y]), expert, settings)
     torch.testing.assert_close(late, torch.tensor([0.0, 0.0, 1 / 3, 0.0]), atol=1e-3, rtol=0)
-    # One that never comes pays the share of the expert's frames at y.
+    # One that never comes pays the fraction of the expert's frames at y.
     never = newest_costs(torch.stack([x, x, x, x]), expert, settings)
     torch.testing.assert_close(never, torch.tensor([0.0, 0.0, 1 / 3, 1 / 2]), atol=1e-3, rtol=0)
 

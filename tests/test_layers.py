@@ -37,6 +37,7 @@ SHARED = {
     "progress",
     "tasks",
     "malloc",
+    "old_names",
     "optim",
     "plugins",
 }

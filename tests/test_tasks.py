@@ -17,12 +17,12 @@ def test_the_catalogue_is_consistent(task: object) -> None:
     meta_world = task.suite == "Meta-World"  # type: ignore[attr-defined]
     # Meta-World rewards up to 10 a simulator step, and a little for being near.
     # Random actions hit the spinner now and then, and the drawer closes at the lightest push.
-    share, most_a_step = (0.3, 10.0 if meta_world else 1.0)
+    fraction, most_a_step = (0.3, 10.0 if meta_world else 1.0)
     steps = task.evaluation_steps * task.action_repeat  # type: ignore[attr-defined]
     assert task.random_return > 0  # type: ignore[attr-defined]
     assert task.has_expert == (task.expert_return is not None)  # type: ignore[attr-defined]
     if task.has_expert:  # type: ignore[attr-defined]
-        assert task.random_return < share * task.expert_return  # type: ignore[attr-defined]
+        assert task.random_return < fraction * task.expert_return  # type: ignore[attr-defined]
         assert task.expert_return <= most_a_step * steps  # type: ignore[attr-defined]
     assert 0 < task.episode_steps <= task.evaluation_steps  # type: ignore[attr-defined]
 

@@ -149,7 +149,7 @@ def require_positive(**fields: float) -> None:
             raise BootifolError(f"{name} must be positive, not {value}")
 
 
-def require_share(**fields: float) -> None:
+def require_fraction(**fields: float) -> None:
     """Refuses numbers outside of [0, 1].
 
     Raises:

@@ -96,7 +96,7 @@ CPU = TrainingConfig(
         relabel_episodes=4,
     ),
     demonstrations=DemonstrationConfig(
-        share=0.25, videos=3000, inverse_dynamics_updates=2000, cloning_updates=5000
+        fraction=0.25, videos=3000, inverse_dynamics_updates=2000, cloning_updates=5000
     ),
     evaluation=EvaluationConfig(every=2500, long_episodes=5, final_episodes=50),
 )
@@ -154,7 +154,7 @@ DRAWN_PIXELS = replace(
         ema_decay=0.0,
     ),
     demonstrations=DemonstrationConfig(),
-    alignment=AlignmentConfig(gradient_steps=150, time_share=0.25, log_every=10),
+    alignment=AlignmentConfig(gradient_steps=150, time_fraction=0.25, log_every=10),
     interactive=InteractiveConfig(
         agent_steps=4500, reward_updates_until=850, agent_videos=150, relabel_episodes=4, log_every=200
     ),
@@ -163,7 +163,7 @@ DRAWN_PIXELS = replace(
     ),
 )
 """For the tasks drawn with numpy, at 32 pixels: a policy from videos in two minutes, without a simulator and
-with nothing cloned. The learning test runs it. N_train is the share of the paper's 100K agent steps, the best of its
+with nothing cloned. The learning test runs it. N_train is the fraction of the paper's 100K agent steps, the best of its
 four here (docs/results/drawn_home.md)."""
 
 SMOKE = replace(
@@ -248,7 +248,7 @@ FRAMES = replace(
 
 DEMO = replace(
     FRAMES,
-    alignment=AlignmentConfig(gradient_steps=1500, time_share=0.3),
+    alignment=AlignmentConfig(gradient_steps=1500, time_fraction=0.3),
     interactive=replace(FRAMES.interactive, agent_steps=60_000, agent_videos=500),
     evaluation=EvaluationConfig(every=10_000, long_episodes=1, final_episodes=10),
     checkpoint_minutes=5.0,
@@ -258,7 +258,7 @@ DEMO = replace(
 DRAWN = _seeing(DRAWN_PIXELS, FrameConfig(late_from=0.0, noise=0.05), replay_capacity=20_000)
 DRAWN = replace(
     DRAWN,
-    alignment=AlignmentConfig(gradient_steps=1000, time_share=0.5),
+    alignment=AlignmentConfig(gradient_steps=1000, time_fraction=0.5),
     interactive=InteractiveConfig(
         agent_steps=8000,
         reward_update_every=8,

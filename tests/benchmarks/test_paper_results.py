@@ -12,7 +12,7 @@ from benchmarks.rows import read_rows
 from bootifol.reports.run_files import read_run
 from reports.made_up_runs import write_run
 
-FRAMES = {"reward__bootifol__reward": "frames", "demonstrations__share": 0.0}
+FRAMES = {"reward__bootifol__reward": "frames", "demonstrations__fraction": 0.0}
 
 
 def kept(out: Path) -> list[tuple[str, ...]]:
@@ -22,7 +22,7 @@ def kept(out: Path) -> list[tuple[str, ...]]:
 def test_a_run_is_kept_under_its_task_system_and_seed(tmp_path: Path) -> None:
     runs, out = tmp_path / "runs", tmp_path / "paper.csv"
     write_run(runs / "frames", [40.0, 60.0], seed=2, seconds=120.0, **FRAMES)
-    write_run(runs / "cloned", [80.0], demonstrations__share=0.25)
+    write_run(runs / "cloned", [80.0], demonstrations__fraction=0.25)
     assert main([str(runs), "--out", str(out)]) == 0
     assert kept(out) == [
         ("reacher_hard", "bootifol", "0", "2", "2.0", "1000", "0.5000"),

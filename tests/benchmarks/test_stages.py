@@ -74,6 +74,6 @@ def test_the_true_reward_learns_and_rewards_nothing(demos: Path, tmp_path: Path)
 def test_the_table_names_every_stage_and_the_whole(demos: Path, capsys: pytest.CaptureFixture[str]) -> None:
     measure(CONFIG, demos, "drawn_home", preset="smoke", runs=1)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[2].startswith("| stage | in a run | ms each | arithmetic ms | ms an agent step | share |")
+    assert lines[2].startswith("| stage | in a run | ms each | arithmetic ms | ms an agent step | fraction |")
     assert lines[4].startswith("| alignment step | 4 |")
     assert lines[-1].startswith("| all | 240 agent steps |")

@@ -85,15 +85,15 @@ def finished(run: PlannedRun, out: Path, scaled: float) -> None:
 
 
 def equivalent_steps(config: TrainingConfig, paper_steps: int) -> int:
-    """N_train of a run that trains its encoders for the same share of its learning as the paper's did.
+    """N_train of a run that trains its encoders for the same fraction of its learning as the paper's did.
 
     Learning begins after the warm-up, which is 0.1 % of the paper's run and a fifth of `cpu`.
     """
     if paper_steps == 0:
         return 0
     before, before_of_paper = config.agent.warm_up_steps, PAPER.agent.warm_up_steps
-    share = (paper_steps - before_of_paper) / (PAPER.interactive.agent_steps - before_of_paper)
-    return before + round((config.interactive.agent_steps - before) * share)
+    fraction = (paper_steps - before_of_paper) / (PAPER.interactive.agent_steps - before_of_paper)
+    return before + round((config.interactive.agent_steps - before) * fraction)
 
 
 @pytest.mark.parametrize("name", ["ablations", "ablations_drawn"])

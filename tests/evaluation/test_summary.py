@@ -32,8 +32,8 @@ def covered(samples: Sequence[np.ndarray], truth: float) -> float:
 
 def test_the_interval_covers_the_true_mean_about_as_often_as_it_says() -> None:
     rng = np.random.default_rng(0)
-    share = covered([rng.normal(2.0, 1.0, 30) for _ in range(300)], 2.0)
-    assert 0.88 < share < 0.98
+    fraction = covered([rng.normal(2.0, 1.0, 30) for _ in range(300)], 2.0)
+    assert 0.88 < fraction < 0.98
 
 
 def test_the_interval_repeats_and_needs_two_values() -> None:

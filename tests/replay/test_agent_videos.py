@@ -60,7 +60,7 @@ def test_a_video_handed_out_does_not_change_when_its_slot_is_overwritten() -> No
 
 
 def test_only_failures_are_drawn_where_so_it_is_asked_for() -> None:
-    ring = AgentVideos(4, FRAMES, SIZE, failures_share=0.5)
+    ring = AgentVideos(4, FRAMES, SIZE, failures_fraction=0.5)
     frames = moving_videos(4)
     for index, reward in enumerate([0.9, 0.1, 0.8, 0.2]):
         ring.add(Video(f"agent-{index}", frames[index]), reward)
@@ -72,7 +72,7 @@ def test_only_failures_are_drawn_where_so_it_is_asked_for() -> None:
     ring.reward_anew(1, 1.0)
     assert drawn(2) == {frames[2].tobytes(), frames[3].tobytes()}
     assert len(drawn(3)) == 3, "never fewer than asked for, where there are so many"
-    restored = AgentVideos(4, FRAMES, SIZE, failures_share=0.5)
+    restored = AgentVideos(4, FRAMES, SIZE, failures_fraction=0.5)
     restored.load_state(ring.state())
     np.testing.assert_array_equal(
         restored.sample(2, np.random.default_rng(3)), ring.sample(2, np.random.default_rng(3))

@@ -182,17 +182,17 @@ def test_named_transitions_are_taken_in_their_order() -> None:
     assert batch.action.tolist() == [[1, 3], [0, 0], [0, 2], [1, 0]]
 
 
-@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
-def test_history_dropout_repeats_the_newest_frame(share: float) -> None:
+@pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0])
+def test_history_dropout_repeats_the_newest_frame(fraction: float) -> None:
     buffer = filled(ReplayBuffer(60, SIZE, 2, stack=3, n_step=1, shift=0), [50])
     transitions = np.arange(400) % 40 + 5
-    batch = buffer.sample(400, np.random.default_rng(0), transitions=transitions, history_dropout=share)
+    batch = buffer.sample(400, np.random.default_rng(0), transitions=transitions, history_dropout=fraction)
     for observation, newest in ((batch.observation, transitions), (batch.next_observation, transitions + 1)):
         times = observation[:, 1::3, 0, 0].numpy().astype(np.int64)
         repeated = (times == newest[:, None]).all(axis=1)
         whole = (times == newest[:, None] + [-2, -1, 0]).all(axis=1)
         assert (repeated ^ whole).all()
-        assert abs(repeated.mean() - share) < 0.1
+        assert abs(repeated.mean() - fraction) < 0.1
 
 
 def test_relabel_of_an_overwritten_episode_says_so() -> None:

@@ -245,7 +245,7 @@ def test_what_time_cut_off_comes_first(
 
 
 def test_a_cloning_phase_that_was_cut_off_is_told(tmp_path: Path) -> None:
-    clones = {"share": 0.25, "inverse_dynamics_updates": 10, "cloning_updates": 10}
+    clones = {"fraction": 0.25, "inverse_dynamics_updates": 10, "cloning_updates": 10}
     directory = write_run(tmp_path / "run", time_budget=600.0, demonstrations=clones)
     with (directory / "metrics.jsonl").open("a") as file:
         file.write('{"phase": "cloning", "gradient_step": 9, "seconds": 5, "agent/cloning_loss": 1.0}\n')

@@ -88,11 +88,11 @@ def test_the_card_says_what_the_run_was(exported: tuple[Path, Path]) -> None:
     [
         ({}, "The **learned reward alone** taught this policy: a reward that was learned from 30 videos"),
         (
-            {"demonstrations__share": 0.5},
+            {"demonstrations__fraction": 0.5},
             "began as a **clone** of the videos, and then **learned by reward**",
         ),
         (
-            {"demonstrations__share": 0.5, "agent__cloning_weight": 1e6},
+            {"demonstrations__fraction": 0.5, "agent__cloning_weight": 1e6},
             "This policy is a **clone** of 30 videos, without actions",
         ),
         ({"method": "environment"}, "The environment's **true reward** taught this policy"),

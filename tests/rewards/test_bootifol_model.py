@@ -138,7 +138,7 @@ def test_a_scale_without_alignment_comes_from_the_first_gradient_steps() -> None
     np.testing.assert_array_equal(model.state()["reward_scale"], settled)
 
 
-def test_spoiled_share_of_the_others_is_drawn_from_the_expert() -> None:
+def test_time_corrupted_fraction_of_the_others_is_drawn_from_the_expert() -> None:
     drawn: list[int] = []
 
     class Counted:
@@ -153,15 +153,15 @@ def test_spoiled_share_of_the_others_is_drawn_from_the_expert() -> None:
             return EXPERT.sample(count, rng)
 
     n = SMALL.videos_per_class
-    for share in (0.0, 0.5):
-        next(make(replace(SMALL, spoiled_share=share)).align(Counted(), OTHER))
+    for fraction in (0.0, 0.5):
+        next(make(replace(SMALL, time_corrupted_fraction=fraction)).align(Counted(), OTHER))
     assert drawn == [n, n, n // 2]
-    with pytest.raises(BootifolError, match="spoiled_share"):
-        BootifolConfig(spoiled_share=1.0)
+    with pytest.raises(BootifolError, match="time_corrupted_fraction"):
+        BootifolConfig(time_corrupted_fraction=1.0)
 
 
-def test_spoiled_videos_are_the_last_of_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = make(replace(SMALL, videos_per_class=4, spoiled_share=0.5, frame_drop=0.0))
+def test_time_corrupted_videos_are_the_last_of_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = make(replace(SMALL, videos_per_class=4, time_corrupted_fraction=0.5, frame_drop=0.0))
     learned_from: list[FrameBatch] = []
     losses = model._losses
     monkeypatch.setattr(
@@ -170,10 +170,10 @@ def test_spoiled_videos_are_the_last_of_the_others(monkeypatch: pytest.MonkeyPat
     next(model.align(EXPERT, OTHER))
     experts, others = ({video.tobytes() for video in source.videos} for source in (EXPERT, OTHER))
     origins = [
-        "expert" if video.tobytes() in experts else "other" if video.tobytes() in others else "spoiled"
+        "expert" if video.tobytes() in experts else "other" if video.tobytes() in others else "time-corrupted"
         for video in learned_from[0]
     ]
-    assert origins == ["expert"] * 4 + ["other"] * 2 + ["spoiled"] * 2
+    assert origins == ["expert"] * 4 + ["other"] * 2 + ["time-corrupted"] * 2
     frames_of_experts = {frame.tobytes() for video in EXPERT.videos for frame in video}
     assert all(frame.tobytes() in frames_of_experts for video in learned_from[0][6:] for frame in video)
 

@@ -33,8 +33,8 @@ class Reaches:
             goal = target if to_target else elsewhere
             for t, frame in enumerate(video):
                 _paint(frame, target, (200, 60, 60), 4)
-                share = min(t / 6, 1.0)
-                _paint(frame, np.round(start + share * (goal - start)).astype(int), (240, 230, 150), 3)
+                fraction = min(t / 6, 1.0)
+                _paint(frame, np.round(start + fraction * (goal - start)).astype(int), (240, 230, 150), 3)
 
     def __len__(self) -> int:
         return len(self.videos)

@@ -18,7 +18,7 @@ LEARNING = replace(
     SMALL,
     videos_per_class=4,
     frames_per_video=1,
-    altered_share=0.2,
+    altered_fraction=0.2,
     early_ends=False,
     frame_drop=0.0,
     sequence_reconstruction_weight=0.0,
@@ -82,7 +82,7 @@ def test_total_is_the_weighted_sum_and_zero_weights_leave_the_decoders_out(preci
 
 def test_losses_are_those_of_videos_encoded_one_by_one() -> None:
     """With pairs by class alone, everything can be recomputed from the videos themselves."""
-    config = replace(SMALL, altered_share=0.0, early_ends=False, frame_drop=0.0, frames_per_video=None)
+    config = replace(SMALL, altered_fraction=0.0, early_ends=False, frame_drop=0.0, frames_per_video=None)
     model = make(config)
     n = config.videos_per_class
 
@@ -120,7 +120,7 @@ def test_losses_are_those_of_videos_encoded_one_by_one() -> None:
 
 
 def test_noisy_copies_have_noise(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = make(replace(SMALL, altered_share=1.0, early_ends=False, frame_drop=0.0, noise=0.1))
+    model = make(replace(SMALL, altered_fraction=1.0, early_ends=False, frame_drop=0.0, noise=0.1))
     encoded: list[torch.Tensor] = []
     encode = model.networks.encode_frames
     monkeypatch.setattr(
@@ -195,7 +195,7 @@ def test_videos_too_short_to_be_altered_are_refused() -> None:
         ("sequence_reconstruction_weight", -0.1),
         ("frame_reconstruction_weight", -0.1),
         ("margin", 0.0),
-        ("altered_share", 1.5),
+        ("altered_fraction", 1.5),
         ("noise", -0.1),
         ("frame_drop", 1.0),
         ("videos_per_class", 1),

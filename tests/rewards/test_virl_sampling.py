@@ -12,7 +12,7 @@ RNG = np.random.default_rng(0)
 
 
 def test_pairs_by_class_are_in_time_and_of_the_right_class() -> None:
-    drawn = draw(replace(CONFIG, altered_share=0.0), 20, RNG)
+    drawn = draw(replace(CONFIG, altered_fraction=0.0), 20, RNG)
     assert len(drawn.noisy) == 0
     np.testing.assert_array_equal(drawn.positive[0], [1, 2, 0, 4, 5, 3])
     np.testing.assert_array_equal(drawn.negative[0], [3, 4, 5, 0, 1, 2])
@@ -22,7 +22,7 @@ def test_pairs_by_class_are_in_time_and_of_the_right_class() -> None:
 
 def test_altered_pairs_are_copies_of_their_anchor() -> None:
     for _ in range(20):
-        drawn = draw(replace(CONFIG, altered_share=1.0), 20, RNG)
+        drawn = draw(replace(CONFIG, altered_fraction=1.0), 20, RNG)
         originals = np.concatenate([np.arange(6), drawn.noisy])
         np.testing.assert_array_equal(originals[drawn.positive[0]], np.arange(6))
         np.testing.assert_array_equal(drawn.negative[0], np.arange(6))

@@ -186,7 +186,7 @@ def test_code_that_a_file_names_wants_trust(tmp_path: Path) -> None:
             "bootifol-a with the preset cpu: .*reward_scale alignment is for the distance reward",
         ),
         (
-            "{tasks: drawn_home, time_budget: 1m, variants: {a: {alignment.time_share: 0.9}}}",
+            "{tasks: drawn_home, time_budget: 1m, variants: {a: {alignment.time_fraction: 0.9}}}",
             "leave less than half for acting",
         ),
         (

@@ -44,7 +44,7 @@ def test_with_a_time_budget_the_time_left_is_known_at_once() -> None:
     timed = replace(RUN, time_budget="60s")
     waiting = [job(timed, RunState("begun")), job(timed, RunState("begun", 5, 0, 15.0), place=HERE)]
     assert seconds_left(waiting, at_once=1) == pytest.approx(60 + 45)
-    assert waiting[1].share == pytest.approx(0.25)
+    assert waiting[1].fraction == pytest.approx(0.25)
 
 
 def test_the_table_shows_what_goes_on_first() -> None:

@@ -46,7 +46,7 @@ evaluation.showcase_episodes: 1
 evaluation.final_episodes: 1
 evaluation.held_out_videos: 2
 evaluation.sight_episodes: 0
-demonstrations.share: 0.0
+demonstrations.fraction: 0.0
 agent.cloning_weight: 0.0
 tracker: none
 """

@@ -28,7 +28,7 @@ def test_without_a_time_budget_schedules_follow_agent_steps() -> None:
 
 
 def test_with_a_time_budget_schedules_are_stretched_over_what_alignment_left() -> None:
-    budget = Budget(agent_steps=1000, seconds=100.0, alignment_steps=50, alignment_share=0.2)
+    budget = Budget(agent_steps=1000, seconds=100.0, alignment_steps=50, alignment_fraction=0.2)
     counters = Counters(agent_steps=7, alignment_seconds=20.0, interactive_seconds=40.0)
     assert budget.scheduled_steps(counters) == 500
     assert not budget.ended(counters)
@@ -50,13 +50,13 @@ def test_progress_counts_steps_or_with_a_time_budget_seconds() -> None:
     steps = Budget(agent_steps=1000, alignment_steps=50)
     assert steps.alignment_extent(counters) == ("gradient steps", 3, 50)
     assert steps.interactive_extent(counters) == ("agent steps", 7, 1000)
-    seconds = Budget(agent_steps=1000, seconds=100.0, alignment_steps=50, alignment_share=0.25)
+    seconds = Budget(agent_steps=1000, seconds=100.0, alignment_steps=50, alignment_fraction=0.25)
     assert seconds.alignment_extent(counters) == ("seconds", 20, 25)
     assert seconds.interactive_extent(counters) == ("seconds", 41, 80)
 
 
 def test_alignment_ends_with_its_steps_or_its_share_of_the_time() -> None:
-    budget = Budget(agent_steps=1000, seconds=100.0, alignment_steps=50, alignment_share=0.2)
+    budget = Budget(agent_steps=1000, seconds=100.0, alignment_steps=50, alignment_fraction=0.2)
     assert not budget.alignment_ended(Counters(alignment_steps=49, alignment_seconds=19.9))
     assert budget.alignment_ended(Counters(alignment_steps=50))
     assert budget.alignment_ended(Counters(alignment_steps=3, alignment_seconds=20.0))

@@ -115,7 +115,7 @@ def test_a_file_of_before_trackers_is_read(tmp_path: Path) -> None:
         ("agent: {n_step: 1, n_step: 2}", "cannot be read: n_step stands there twice"),
         ("[" * 5000, "nested too deeply"),
         ("sead: 3", "there is no field 'sead'; the nearest is seed"),
-        ("demonstration: {share: 0}", "there is no field 'demonstration'; the nearest is demonstrations"),
+        ("demonstration: {fraction: 0}", "there is no field 'demonstration'; the nearest is demonstrations"),
         ("seed: one", "seed cannot be 'one'"),
         ("time_budget: soon", "time_budget: 'soon' is not a duration"),
         ("format: 9", "is of format 9, and this version reads 1"),

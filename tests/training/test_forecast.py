@@ -49,7 +49,7 @@ def test_measuring_changes_nothing_of_the_run(
 ) -> None:
     run = new_run(tmp_path / "run", demos, method, config)
     before = {name: part.state() for name, part in run.parts.stateful().items()}
-    budget = Budget(config.interactive.agent_steps, 60.0, cloning_share=0.1)
+    budget = Budget(config.interactive.agent_steps, 60.0, cloning_fraction=0.1)
     told = forecast(
         replace(run.config, time_budget=60.0), run.parts, budget, Counters(alignment_seconds=10.0)
     )

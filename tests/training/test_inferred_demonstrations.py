@@ -29,7 +29,7 @@ from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.types import Arrays, Batch, Episode, FrameBatch, Frames, Metrics, Video, VideoSource
 
 SIZE, STEPS, MOVES = 32, 12, 4
-CONFIG = DemonstrationConfig(share=0.5, batch_size=32)
+CONFIG = DemonstrationConfig(fraction=0.5, batch_size=32)
 
 
 def sliding_square(seed: int, actions: np.ndarray) -> Frames:
@@ -121,9 +121,11 @@ def test_actions_and_rewards_of_the_videos_are_inferred() -> None:
     np.testing.assert_array_equal(everything.reward.numpy().reshape(6, STEPS)[:, 0], np.arange(6))
 
 
-@pytest.mark.parametrize(("moving_share", "expected"), [(0.75, 0.75), (1.0, 1.0), (0.0, 0.0)])
-def test_transitions_are_drawn_by_movement(moving_share: float, expected: float) -> None:
-    demonstrations = make_demonstrations(replace(CONFIG, moving_share=moving_share, history_dropout=0.0))
+@pytest.mark.parametrize(("moving_fraction", "expected"), [(0.75, 0.75), (1.0, 1.0), (0.0, 0.0)])
+def test_transitions_are_drawn_by_movement(moving_fraction: float, expected: float) -> None:
+    demonstrations = make_demonstrations(
+        replace(CONFIG, moving_fraction=moving_fraction, history_dropout=0.0)
+    )
     batch = demonstrations.sample(64, np.random.default_rng(0))
     moves = (batch.next_observation[:, 3:] != batch.observation[:, 3:]).flatten(1).any(dim=1)
     assert float(moves.float().mean()) == expected
@@ -139,7 +141,7 @@ def test_videos_without_movement_can_be_drawn_from() -> None:
 
 
 def test_a_mixed_batch_says_which_rows_are_demonstrated() -> None:
-    demonstrations, rng = make_demonstrations(replace(CONFIG, share=0.25)), np.random.default_rng(0)
+    demonstrations, rng = make_demonstrations(replace(CONFIG, fraction=0.25)), np.random.default_rng(0)
     infer_all(demonstrations, rng)
     batch = demonstrations.mixed(agent_steps(), 16, rng)
     assert batch.demonstrated is not None
@@ -181,7 +183,7 @@ def test_inverse_dynamics_prefers_steps_of_the_policy(
     policy_steps: int, newest: int | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     demonstrations, replay = (
-        make_demonstrations(replace(CONFIG, batch_size=64, policy_share=0.5)),
+        make_demonstrations(replace(CONFIG, batch_size=64, policy_fraction=0.5)),
         agent_steps(),
     )
     drawn: list[np.ndarray] = []
@@ -218,14 +220,14 @@ def test_the_inverse_dynamics_sees_both_pictures_shifted_alike(monkeypatch: pyte
 
 
 def test_a_learning_rate_rises_and_falls_in_every_phase() -> None:
-    shares = [one_cycle(done, 100) for done in range(100)]
-    highest = int(np.argmax(shares))
+    fractions = [one_cycle(done, 100) for done in range(100)]
+    highest = int(np.argmax(fractions))
     assert 3 <= highest <= 6
-    assert shares[highest] > 0.99
-    assert shares[0] < 0.25
-    assert 0 < shares[-1] < 0.001
-    assert (np.diff(shares[: highest + 1]) > 0).all()
-    assert (np.diff(shares[highest:]) < 0).all()
+    assert fractions[highest] > 0.99
+    assert fractions[0] < 0.25
+    assert 0 < fractions[-1] < 0.001
+    assert (np.diff(fractions[: highest + 1]) > 0).all()
+    assert (np.diff(fractions[highest:]) < 0).all()
     assert 0 < one_cycle(0, 1) <= 1  # a phase of a single step
 
 
@@ -246,7 +248,7 @@ def test_a_cloning_phase_ends_with_its_share_of_the_time(monkeypatch: pytest.Mon
     demonstrations, rng = make_demonstrations(config), np.random.default_rng(0)
     agent = DrQv2(DrQv2Config(encoder="strided", hidden_dim=16, batch_size=8), SIZE, 2, 1, seed=0)
     counters = Counters(agent_steps=1920, cloning_seconds=7.0)
-    budget = Budget(agent_steps=1000, seconds=100.0, cloning_share=0.3)
+    budget = Budget(agent_steps=1000, seconds=100.0, cloning_fraction=0.3)
     phase = cloning_phase(
         agent, demonstrations, agent_steps(), CountingReward(), rng, budget, counters, log_every=100
     )
@@ -278,7 +280,7 @@ def test_warm_up_actions_are_held(tmp_path: Path, demos: Path) -> None:
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("share", 1.0), ("moving_share", 1.1), ("history_dropout", -0.1), ("cloning_updates", -1)],
+    [("fraction", 1.0), ("moving_fraction", 1.1), ("history_dropout", -0.1), ("cloning_updates", -1)],
 )
 def test_mistakes_are_sentences(field: str, value: float) -> None:
     with pytest.raises(BootifolError, match=field):

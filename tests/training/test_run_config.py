@@ -66,7 +66,7 @@ def test_a_directory_without_a_run_is_named(tmp_path: Path) -> None:
         (("config", "agent", "learning_rate"), -1e-4, "agent: learning_rate must be positive"),
         (("config", "tensorboard"), 1, "says that tensorboard is 1"),
         (("config", "tracker"), "wand", "says that tracker is 'wand'"),
-        (("config", "alignment", "time_share"), 3.0, "alignment: time_share must lie in"),
+        (("config", "alignment", "time_fraction"), 3.0, "alignment: time_fraction must lie in"),
         (("seed",), "x", "says that seed is 'x'"),
         (("seed",), -1, "seed must be at least 0"),
         (("time_budget",), "60m", "says that time_budget is '60m'"),
@@ -99,7 +99,7 @@ def test_a_learning_rate_lowered_by_hand_is_the_runs(tmp_path: Path) -> None:
 def test_acting_gets_half_of_a_time_budget() -> None:
     require_time_to_act(CPU)
     require_time_to_act(DRAWN)  # nothing is cloned
-    greedy = replace(CPU, alignment=replace(CPU.alignment, time_share=0.26))
+    greedy = replace(CPU, alignment=replace(CPU.alignment, time_fraction=0.26))
     with pytest.raises(BootifolError, match="leave less than half for acting and learning"):
         require_time_to_act(greedy)
 
@@ -133,7 +133,7 @@ def test_the_paper_preset_is_the_papers_table() -> None:
     assert (agent.exploration_start, agent.exploration_end, agent.exploration_steps) == (1.0, 0.1, 500_000)
     assert (agent.noise_clip, agent.tau, agent.update_every, agent.random_shift) == (0.3, 0.01, 2, 4)
     assert (agent.replay_capacity, agent.warm_up_steps) == (100_000, 1920)
-    assert paper.demonstrations.share == 0 and agent.cloning_weight == 0
+    assert paper.demonstrations.fraction == 0 and agent.cloning_weight == 0
 
 
 def test_a_run_that_goes_on_with_other_code_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

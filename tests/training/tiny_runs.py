@@ -60,7 +60,7 @@ WITH_DEMONSTRATIONS = replace(
     TINY,
     agent=replace(TINY.agent, warm_up_hold=4, cloning_weight=1.0),
     demonstrations=DemonstrationConfig(
-        share=0.5,
+        fraction=0.5,
         videos=4,
         inverse_dynamics_updates=3,
         cloning_updates=4,

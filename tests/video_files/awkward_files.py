@@ -199,8 +199,8 @@ def _alpha(directory: Path) -> list[Awkward]:
     frames = np.concatenate([scene(), np.full((12, 48, 64, 1), 255, np.uint8)], axis=-1)
     frames[:, 30:, :, 3] = 0
     frames[:, :30, :10, 3] = 128
-    share = frames[..., 3:].astype(float) / 255
-    expected = (frames[..., :3] * share + 255 * (1 - share)).round().astype(np.uint8)
+    fraction = frames[..., 3:].astype(float) / 255
+    expected = (frames[..., :3] * fraction + 255 * (1 - fraction)).round().astype(np.uint8)
     folder = directory / "transparent"
     folder.mkdir()
     for number, frame in enumerate(frames):

@@ -11,8 +11,8 @@ from bootifol.errors import (
     require_at_least,
     require_below_one,
     require_choices,
+    require_fraction,
     require_positive,
-    require_share,
 )
 
 Precision = Literal["bf16", "fp32"]
@@ -97,7 +97,7 @@ class DrQv2Config:
 
     ema_decay: float = 0.0
     """Beyond DrQ-v2: without exploration the policy acts with running averages of encoder and actor, which keep this
-    share of themselves at each update and so even out the noise of the last ones; 0, as in its paper, the newest.
+    fraction of themselves at each update and so even out the noise of the last ones; 0, as in its paper, the newest.
     Until 1 / (1 - ema_decay) updates they are plain means, in which nothing is left of the initial parameters."""
 
     precision: Precision = "fp32"
@@ -118,7 +118,7 @@ class DrQv2Config:
         )
         require_at_least(0, **of_self(*exploration, "saturation_weight", "cloning_weight", "random_shift"))
         require_positive(**of_self("learning_rate"))
-        require_share(**of_self("discount", "tau"))
+        require_fraction(**of_self("discount", "tau"))
         require_below_one(**of_self("ema_decay"))
 
     def exploration(self, agent_steps: float) -> float:

@@ -29,7 +29,7 @@ def tasks(
     Args:
         names: Tasks to list. gymnasium:ID, MODULE:FUNCTION and what installed packages bring are tasks, too.
         measure: Play this many evaluation episodes (seeds 0, 1, …) of each task's expert and of random actions, and
-            print their mean return, standard deviation, 95% interval, and the share of episodes that succeeded at
+            print their mean return, standard deviation, 95% interval, and the fraction of episodes that succeeded at
             any step, where the environment says so.
     """
     if measure < 0:

@@ -30,13 +30,13 @@ class AugmentationConfig:
     """Levels of 255 added or taken away, at most; half as many more for each color by itself."""
 
     contrast: float = 0.1
-    """Share by which differences grow or shrink, at most; half as much more for each color by itself."""
+    """Fraction by which differences grow or shrink, at most; half as much more for each color by itself."""
 
     noise: float = 3.0
     """Greatest standard deviation of the noise of every pixel, in levels of 255."""
 
     blur: float = 0.5
-    """Share of videos that are blurred, by a binomial filter of 3x3 pixels."""
+    """Fraction of videos that are blurred, by a binomial filter of 3x3 pixels."""
 
     def __post_init__(self) -> None:
         require_at_least(
@@ -44,7 +44,7 @@ class AugmentationConfig:
         )
         if self.contrast > 0.5 or self.blur > 1:
             raise BootifolError(
-                "augmentation takes a contrast of at most 0.5 and a blur, which is a share of videos, of at most 1, "
+                "augmentation takes a contrast of at most 0.5 and a blur, which is a fraction of videos, of at most 1, "
                 f"not {self.contrast} and {self.blur}"
             )
 

@@ -26,7 +26,7 @@ from bootifol.progress import progress
 from bootifol.tasks import Task
 
 LONG_STILLNESS = 0.5
-"""Share of a video that may pass without motion before something moves. In recorded experts it is at most 0.2."""
+"""Fraction of a video that may pass without motion before something moves. In recorded experts it is at most 0.2."""
 
 USUAL_STILLNESS = 0.25
 """Where half of the videos stand still at their end for less than this, one that does for `LONG_STILLNESS` is odd. An
@@ -36,7 +36,7 @@ FEW_GROUPS = 3
 """Groups of nearly the same videos that get a sentence each; more are one sentence."""
 
 LITTLE_MOTION = 0.007
-"""Share of the picture that changes in a step below which a task is hard to see: 29 pixels of 64×64. The catalogue's
+"""Fraction of the picture that changes in a step below which a task is hard to see: 29 pixels of 64×64. The catalogue's
 experts change 72 or more; Reacher-v5 through its own camera 11, from which no action could be inferred."""
 
 
@@ -57,7 +57,7 @@ class Defects:
     cut: tuple[str, ...] = ()
     """Going over to another scene, and the frame where they do."""
     little_motion: float | None = None
-    """Share of the picture that changes in a step of most videos, where that is too little to learn from."""
+    """Fraction of the picture that changes in a step of most videos, where that is too little to learn from."""
 
     def sentences(self) -> list[str]:
         """One sentence a defect, with what to do."""

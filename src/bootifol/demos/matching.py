@@ -23,16 +23,16 @@ gains that change within a video. background: what stands still gives way to wha
 REPAIRS: tuple[Repair, ...] = get_args(Repair)
 
 SCALES = np.arange(1.0, 0.69, -0.02)
-"""Sides of the squares that are tried, as shares of the picture's."""
+"""Sides of the squares that are tried, as fractions of the picture's."""
 
 PLACES = 7
 """Places along each axis that are tried for each side, first all over, then around the best."""
 
 WORTH_A_CROP = 0.85
-"""A crop must leave less than this share of the difference, for it costs sharpness."""
+"""A crop must leave less than this fraction of the difference, for it costs sharpness."""
 
 TRIMMED = 0.75
-"""Share of the pixels that a fit believes: the others may show what moved."""
+"""Fraction of the pixels that a fit believes: the others may show what moved."""
 
 GAINS = (0.4, 2.5)
 """Least and largest gain of a channel."""

@@ -37,7 +37,7 @@ CHANGED_LEVELS = 24
 compression is less."""
 
 MOVING_SHARE = 0.1
-"""Frames in which fewer pixels change than this share of the most that ever change at once stand still."""
+"""Frames in which fewer pixels change than this fraction of the most that ever change at once stand still."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,13 @@ class VideoStatistics:
     """uint8 `[DIGEST_FRAMES, cells, cells, 3]`."""
 
     still_before_motion: float
-    """The longest time that nothing moves and something moves later, as a share of the video."""
+    """The longest time that nothing moves and something moves later, as a fraction of the video."""
 
     still_at_end: float
-    """The time after the last motion, as a share of the video; 1 when nothing ever moves."""
+    """The time after the last motion, as a fraction of the video; 1 when nothing ever moves."""
 
     moving_pixels: float
-    """Share of the picture's pixels that change from one frame to the next while something moves, a median."""
+    """Fraction of the picture's pixels that change from one frame to the next while something moves, a median."""
 
     blank: int
     """Frames that are black, white or of any one color."""
@@ -74,7 +74,7 @@ def statistics_of(frames: Frames) -> VideoStatistics:
     """
     cells = low_resolution(frames)
     blank = (np.ptp(cells, axis=(1, 2)) < BLANK_RANGE).all(-1)
-    before, end = _still_shares(cells)
+    before, end = _still_fractions(cells)
     chosen = np.linspace(0, len(frames) - 1, DIGEST_FRAMES).round().astype(int)
     return VideoStatistics(
         first=frames[0].copy(),  # a view would keep the whole video in memory
@@ -99,7 +99,7 @@ def low_resolution(frames: Frames) -> NDArray[np.float32]:
     return means
 
 
-def _still_shares(cells: NDArray[np.float32]) -> tuple[float, float]:
+def _still_fractions(cells: NDArray[np.float32]) -> tuple[float, float]:
     """Longest stillness before a motion, and stillness at the end.
 
     A stillness is compared with the frame it begins with, so that slow motions add up and end it.

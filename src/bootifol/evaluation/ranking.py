@@ -148,8 +148,8 @@ _PAIRS = (("expert", "half_good"), ("half_good", "random"), ("expert", "random")
 def _tau_of_pairs(pairs: Sequence[float], rewards: Mapping[str, NDArray[np.float64]]) -> float:
     """Kendall's tau-b from the AUC of each of `_PAIRS`, where no two videos have one reward.
 
-    Of pairs of videos of two kinds the share AUC agrees with the order and the rest does not; pairs within a kind are
-    ties. Videos drawn twice by the bootstrap are no ties of the reward, so tau is not computed from them directly.
+    Of pairs of videos of two kinds the fraction AUC agrees with the order and the rest does not; pairs within a kind
+    are ties. Videos drawn twice by the bootstrap are no ties of the reward, so tau is not computed from them directly.
     """
     counts = np.array([len(rewards[better]) * len(rewards[worse]) for better, worse in _PAIRS])
     videos = sum(len(of_kind) for of_kind in rewards.values())
@@ -189,7 +189,7 @@ def expert_above_random(rows: Sequence[RankingRow]) -> float:
 
 
 def area_under_curve(better: NDArray[np.float64], worse: NDArray[np.float64]) -> float:
-    """The share of pairs in which the better one `[N]` is above the worse one `[M]`; ties count half."""
+    """The fraction of pairs in which the better one `[N]` is above the worse one `[M]`; ties count half."""
     difference = better[:, None] - worse[None, :]
     return float(np.mean(difference > 0) + 0.5 * np.mean(difference == 0))
 

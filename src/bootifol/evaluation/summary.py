@@ -52,8 +52,8 @@ def summarize(values: ArrayLike, confidence: float = 0.95, resamples: int = 5000
     )
 
 
-def _middle(values: NDArray[np.float64], share: float) -> tuple[float, float]:
-    """The ends of the middle share of the values."""
-    tail = (1.0 - share) / 2.0
+def _middle(values: NDArray[np.float64], fraction: float) -> tuple[float, float]:
+    """The ends of the middle fraction of the values."""
+    tail = (1.0 - fraction) / 2.0
     low, high = np.quantile(values, [tail, 1.0 - tail])
     return float(low), float(high)

@@ -33,7 +33,7 @@ class AgentVideos:
         size: int,
         feature_size: int = 0,
         feature_bytes: int = 4,
-        failures_share: float = 1.0,
+        failures_fraction: float = 1.0,
     ) -> None:
         """Reserves the memory (the system hands it out as episodes arrive).
 
@@ -43,7 +43,7 @@ class AgentVideos:
             size: height and width of a frame in pixels.
             feature_size: features of a frame, kept instead of its pixels; 0 keeps the pixels.
             feature_bytes: 4 for float32 features, 1 for int8 states.
-            failures_share: share of the videos, those of the lowest learned reward, that `sample` draws from.
+            failures_fraction: fraction of the videos, those of the lowest learned reward, that `sample` draws from.
         """
         if capacity < 1:
             raise BootifolError(f"the agent's videos need room for at least 1 episode, not {capacity}")
@@ -54,7 +54,7 @@ class AgentVideos:
             np.zeros(shape, np.float32) if feature_bytes == 4 else np.zeros(shape, np.int8)
         )
         self._rewards = np.zeros(capacity, np.float32)
-        self._failures_share = failures_share
+        self._failures_fraction = failures_fraction
         self._names: list[str] = []
         self._next = 0
 
@@ -131,7 +131,7 @@ class AgentVideos:
     def _drawn(self, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
         """Slots to sample: of any video, or of the failures, which are never fewer than are asked for if so many are
         kept."""
-        failures = max(math.ceil(self._failures_share * len(self)), min(count, len(self)))
+        failures = max(math.ceil(self._failures_fraction * len(self)), min(count, len(self)))
         slots = np.arange(len(self))
         if failures < len(self):
             slots = np.argsort(self._rewards[: len(self)], kind="stable")

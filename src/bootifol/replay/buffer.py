@@ -214,7 +214,7 @@ class ReplayBuffer:
             same_shift: whether the two observations of a transition are shifted alike, for learning what moved
                 between them; otherwise each has its own random shift, as in DrQ-v2.
             transitions: numbers `[B]` from 0 to `len(self) - 1`, the oldest first, to take these and draw none.
-            history_dropout: share of the transitions whose stacks repeat their newest frame, as at an episode's start.
+            history_dropout: fraction of the transitions whose stacks repeat their newest frame, as at a start.
 
         Raises:
             BootifolError: the buffer is empty.

@@ -24,13 +24,13 @@ WIDTH = 10.4
 """Width in inches of a figure that fills the page."""
 
 LEFT, RIGHT = 0.08, 0.985
-"""Where the pictures begin and end, as shares of the width."""
+"""Where the pictures begin and end, as fractions of the width."""
 
 PICTURES = 10
 """Pictures of a strip."""
 
 PICTURE_SHARE = 0.97
-"""Share of its stretch of time that a picture covers; the rest is the gap to the next."""
+"""Fraction of its stretch of time that a picture covers; the rest is the gap to the next."""
 
 
 def videos_of_start(run: RunFiles, start: int) -> dict[str, ShowcaseVideo]:
@@ -101,8 +101,13 @@ def expert_above_agent(runs: Sequence[RunFiles], start: int = 0) -> Figure:
             steps = max(len(video.rewards) for video in videos.values())
             moments = [round(number * steps / (PICTURES - 1)) for number in range(PICTURES)]
             for row, (kind, video) in enumerate(videos.items(), start=1):
-                left, bottom, width, share = layout.box(row)
-                box = (left, (top + bottom * layout.height) / height, width, share * layout.height / height)
+                left, bottom, width, fraction = layout.box(row)
+                box = (
+                    left,
+                    (top + bottom * layout.height) / height,
+                    width,
+                    fraction * layout.height / height,
+                )
                 axes = figure.add_axes(box)
                 draw_strip(axes, kind, video, steps, moments, KIND_COLORS[kind])
                 if row == 1:
@@ -141,7 +146,7 @@ class _Layout:
         return self.top + self.curve_height + strips + self.bottom
 
     def box(self, row: int) -> tuple[float, float, float, float]:
-        """Left, bottom, width and height of a row (0: the curves) as shares of the figure."""
+        """Left, bottom, width and height of a row (0: the curves) as fractions of the figure."""
         bottom = self.bottom + (self.strips - row) * (self.picture_height + self.gap)
         height = self.picture_height if row else self.curve_height
         return LEFT, bottom / self.height, RIGHT - LEFT, height / self.height

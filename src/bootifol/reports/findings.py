@@ -28,7 +28,7 @@ FEWEST_STARTS = 5
 """Of evaluation episodes at either end: a bootstrap interval of fewer is no interval."""
 
 LEAST_OF_A_PHASE = 0.5
-"""Share of its gradient steps below which a phase was cut off."""
+"""Fraction of its gradient steps below which a phase was cut off."""
 
 FEWEST_REWARDS = 20
 """Records of the learned reward; a quarter is five."""
@@ -92,7 +92,7 @@ def _gradient_steps_wanted(run: RunFiles) -> dict[str, int]:
         return value if isinstance(value, int | float) else 0
 
     wanted = {ALIGNMENT: field("alignment", "gradient_steps")}
-    if field("demonstrations", "share") > 0:
+    if field("demonstrations", "fraction") > 0:
         updates = ("inverse_dynamics_updates", "cloning_updates")
         wanted[CLONING] = sum(field("demonstrations", name) for name in updates)
     return {phase: int(count) for phase, count in wanted.items()}
@@ -184,18 +184,18 @@ def _order_of_videos(run: RunFiles) -> Finding | None:
 
 def _reward_without_half_good(run: RunFiles) -> Finding | None:
     """All that imported videos can tell: nobody filmed a performer that is half as good."""
-    shares = [
+    fractions = [
         expert_above_random(rows)
         for rows in run.ranking_moments().values()
         if {"expert", "random"} <= {row.kind for row in rows}
     ]
-    if not shares:
+    if not fractions:
         return None
-    text = f"The reward puts an unseen expert video above a random one in {shares[-1]:.0%} of pairs (a coin: 50%)"
-    if len(shares) > 1:
-        text += f"; before the agent acted it was {shares[0]:.0%}"
+    text = f"The reward puts an unseen expert video above a random one in {fractions[-1]:.0%} of pairs (a coin: 50%)"
+    if len(fractions) > 1:
+        text += f"; before the agent acted it was {fractions[0]:.0%}"
     text += ". Without half-good videos nothing tells how it ranks what comes between."
-    return Finding(_verdict(shares[-1], good=0.95, fair=0.8), text)
+    return Finding(_verdict(fractions[-1], good=0.95, fair=0.8), text)
 
 
 def _cloning(run: RunFiles) -> Finding | None:

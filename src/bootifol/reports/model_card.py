@@ -145,7 +145,7 @@ def _clones(run: RunFiles) -> bool:
     """Whether the policy was ever taught by videos' inferred actions."""
     config = dict(flattened(run.config))
     try:
-        shared = float(config.get("demonstrations.share", 0.0)) > 0
+        shared = float(config.get("demonstrations.fraction", 0.0)) > 0
     except ValueError:  # somebody wrote no number
         shared = False
     return shared or CLONING in run.phase_seconds

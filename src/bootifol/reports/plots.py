@@ -209,7 +209,7 @@ def sight_plot(moments: Mapping[int, Mapping[str, float]]) -> Figure:
         axes.set_xlim(-0.03, 1.03)
         axes.set_yticks(range(len(kinds)), [kind.replace("_", " ") for kind in reversed(kinds)])
         axes.set_ylim(-0.6, len(kinds) - 0.4)
-        axes.set_xlabel("share of pairs in which the expert is rewarded above it")
+        axes.set_xlabel("fraction of pairs in which the expert is rewarded above it")
         return figure
 
 

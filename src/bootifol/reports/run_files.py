@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import EvaluationRow, Item, RankingRow, Table, read_evaluations, read_ranking
 from bootifol.files import parsed_json, read_arrays, read_json
+from bootifol.old_names import with_todays_names
 from bootifol.types import Arrays, Frames
 
 ALIGNMENT = "alignment"
@@ -294,7 +295,7 @@ def described(
         if _is_finite(time_budget) and isinstance(time_budget, int | float)
         else None,
         command=_as_text(header.get("command", "")),
-        config=_as_mapping(header.get("config"), "config", notes),
+        config=with_todays_names(_as_mapping(header.get("config"), "config", notes)),
         versions=_versions(header, notes),
         videos={
             k: v

@@ -49,7 +49,7 @@ class Job:
         return self.state.state if self.state.state in ("done", "failed") else "stopped"
 
     @property
-    def share(self) -> float:
+    def fraction(self) -> float:
         """Of its learning that is done, from 0 to 1."""
         if self.state.state == "done":
             return 1.0
@@ -73,7 +73,7 @@ def seconds_left(jobs: Sequence[Job], at_once: int) -> float | None:
         """Seconds of its learning in all, if it goes on as it went."""
         if job.run.seconds is not None:
             return job.run.seconds
-        return job.state.seconds / job.share if job.share and job.state.seconds else None
+        return job.state.seconds / job.fraction if job.fraction and job.state.seconds else None
 
     known = [(job.run, seconds) for job in jobs if (seconds := whole(job)) is not None]
     left = 0.0
@@ -150,7 +150,7 @@ class Board:
             table.add_row(
                 Text(job.run.name),
                 Text(job.status, style={"failed": "red", "done": "green"}.get(job.status, "")),
-                f"{job.share:.0%}" if begun else "",
+                f"{job.fraction:.0%}" if begun else "",
                 Text(state.error if job.status == "failed" else state.far if begun else ""),
                 Text(job.place.host if job.place is not None else ""),
             )

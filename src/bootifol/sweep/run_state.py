@@ -11,6 +11,7 @@ from typing import Literal
 
 from bootifol.errors import BootifolError
 from bootifol.files import read_json
+from bootifol.old_names import with_todays_names
 from bootifol.progress import duration
 from bootifol.reports.comparison import decisive, unfinished_because
 from bootifol.reports.run_files import read_run
@@ -121,7 +122,7 @@ def check_is_planned(run: PlannedRun, directory: Path) -> None:
             for config in (run.config, TrainingConfig())
         )
         # A run that is older than a field was made as the field's default says.
-        written = default | decisive(there.get("config", {}), run.method)
+        written = default | decisive(with_todays_names(there.get("config", {})), run.method)
         wanted |= {"time_budget": run.seconds, **planned}
         found |= {"time_budget": there.get("time_budget"), **written}
     for name, value in wanted.items():

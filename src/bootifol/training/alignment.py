@@ -17,7 +17,7 @@ def alignment_phase(
     counters: Counters,
     log_every: int,
 ) -> Iterator[PhaseStep]:
-    """Takes gradient steps on expert and random videos until N_pretrain, or the phase's share of the time.
+    """Takes gradient steps on expert and random videos until N_pretrain, or the phase's fraction of the time.
 
     Args:
         reward_model: any method.

@@ -96,23 +96,25 @@ class Budget:
     alignment_steps: int = 0
     """N_pretrain."""
 
-    alignment_share: float = 0.0
-    """Largest share of `seconds` for the Alignment Phase."""
+    alignment_fraction: float = 0.0
+    """Largest fraction of `seconds` for the Alignment Phase."""
 
-    cloning_share: float = 0.0
-    """Largest share of `seconds` for one Cloning Phase."""
+    cloning_fraction: float = 0.0
+    """Largest fraction of `seconds` for one Cloning Phase."""
 
     def alignment_ended(self, counters: Counters) -> bool:
         if counters.alignment_steps >= self.alignment_steps:
             return True
-        return self.seconds is not None and counters.alignment_seconds >= self.alignment_share * self.seconds
+        return (
+            self.seconds is not None and counters.alignment_seconds >= self.alignment_fraction * self.seconds
+        )
 
     def cloning_passed(self, counters: Counters) -> float:
-        """What share of the last Cloning Phase's time has passed, 1 where it is over; without a limit 0, always."""
+        """What fraction of the last Cloning Phase's time has passed, 1 where it is over; without a limit 0, always."""
         if self.seconds is None:
             return 0.0
         passed = counters.cloning_seconds - counters.cloning_seconds_before
-        return min(passed / max(self.cloning_share * self.seconds, 1e-9), 1.0)
+        return min(passed / max(self.cloning_fraction * self.seconds, 1e-9), 1.0)
 
     def scheduled_steps(self, counters: Counters) -> int:
         """Where schedules stand, in agent steps from 0 to N_π."""
@@ -129,7 +131,7 @@ class Budget:
         """What the Alignment Phase counts, how much is done, and how much there is: gradient steps or seconds."""
         if self.seconds is None:
             return "gradient steps", counters.alignment_steps, self.alignment_steps
-        return "seconds", int(counters.alignment_seconds), round(self.alignment_share * self.seconds)
+        return "seconds", int(counters.alignment_seconds), round(self.alignment_fraction * self.seconds)
 
     def interactive_extent(self, counters: Counters) -> tuple[str, int, int]:
         """The same of the Interactive Phase: agent steps or seconds."""

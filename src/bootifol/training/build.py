@@ -94,7 +94,7 @@ def build_parts(run: RunConfig, task: Task, console: Console, demos: Demos | Non
         demos = open_demos(run, task, backbone, console)
     # The upper bound has no demonstrations: it learns from true rewards, which videos do not tell.
     demonstrated = (
-        min(config.demonstrations.videos, len(demos.expert)) if config.demonstrations.share > 0 else 0
+        min(config.demonstrations.videos, len(demos.expert)) if config.demonstrations.fraction > 0 else 0
     )
     if reward_model.reads_environment_reward:
         demonstrated = 0
@@ -120,7 +120,7 @@ def build_parts(run: RunConfig, task: Task, console: Console, demos: Demos | Non
     console.print(f"memory when full: {', '.join(memory)}")
     demonstrations = None
     replay = build_replay(run, reward_model, capacity, action_dim)
-    agent_videos = AgentVideos(*ring, failures_share=config.interactive.failures_share)
+    agent_videos = AgentVideos(*ring, failures_fraction=config.interactive.failures_fraction)
     if demonstrated:
         demonstrations = Demonstrations(
             config.demonstrations,

@@ -19,7 +19,7 @@ from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.types import StepMetrics
 
 INVERSE_DYNAMICS_TIME = 1 / 3
-"""Share of a Cloning Phase's time, where it is limited, by which the inverse dynamics has learned."""
+"""Fraction of a Cloning Phase's time, where it is limited, by which the inverse dynamics has learned."""
 
 
 def cloning_phase(
@@ -40,7 +40,7 @@ def cloning_phase(
         agent_replay: the agent's own steps.
         reward_model: rewards the expert videos.
         rng: draws batches and references.
-        budget: where it limits the time, the phase ends with its share of it, and a run whose time is over ends it.
+        budget: where it limits the time, the phase ends with its fraction of it, and a run whose time is over ends it.
         counters: those of Cloning Phases are kept up to date.
         log_every: steps from one log line to the next.
 
@@ -92,7 +92,7 @@ def cloning_phase(
 
 
 def one_cycle(done: int, steps: int, time_passed: float = 0.0) -> float:
-    """What share of its highest value a learning rate has at gradient step `done` of `steps`.
+    """What fraction of its highest value a learning rate has at gradient step `done` of `steps`.
 
     It rises for a twentieth of them and falls to 0 with half a cosine, so that the parameters come to rest; where the
     time for them is further on than they are, by that.

@@ -18,9 +18,9 @@ from bootifol.errors import (
     require_at_most,
     require_below_one,
     require_choices,
+    require_fraction,
     require_positive,
     require_reasonable,
-    require_share,
 )
 from bootifol.rewards.config import RewardConfig
 from bootifol.tracking import TrackerName
@@ -33,15 +33,15 @@ class AlignmentConfig:
     gradient_steps: int = 8000
     """N_pretrain of Algorithm 1."""
 
-    time_share: float = 0.15
-    """With a time budget, the largest share of it that this phase may take."""
+    time_fraction: float = 0.15
+    """With a time budget, the largest fraction of it that this phase may take."""
 
     log_every: int = 20
     """Gradient steps a line of metrics averages over."""
 
     def __post_init__(self) -> None:
         require_at_least(0, gradient_steps=self.gradient_steps)
-        require_share(**fields_of("alignment", self, "time_share"))
+        require_fraction(**fields_of("alignment", self, "time_fraction"))
         require_at_least(1, log_every=self.log_every)
 
 
@@ -62,9 +62,9 @@ class InteractiveConfig:
     agent_videos: int = 5000
     """Capacity of D_a: how many of the agent's newest episodes the reward learns from."""
 
-    failures_share: float = 1.0
-    """Beyond the paper: share of the agent's videos, those of the lowest learned reward, that the reward learns from as
-    the other class; 1, as in the paper, all. The better the agent gets, the more of all are successes, and a reward
+    failures_fraction: float = 1.0
+    """Beyond the paper: fraction of the agent's videos, those of the lowest learned reward, that the reward learns from
+    as the other class; 1, as in the paper, all. The better the agent gets, the more of all are successes, and a reward
     that learns to tell them from the expert's spoils the policy."""
 
     relabel_episodes: int = 0
@@ -85,9 +85,9 @@ class InteractiveConfig:
             reward_updates_until=self.reward_updates_until,
             relabel_episodes=self.relabel_episodes,
         )
-        if not 0 < self.failures_share <= 1:
+        if not 0 < self.failures_fraction <= 1:
             raise BootifolError(
-                f"interactive.failures_share must be above 0 and at most 1, not {self.failures_share}"
+                f"interactive.failures_fraction must be above 0 and at most 1, not {self.failures_fraction}"
             )
         require_at_least(
             1,
@@ -102,21 +102,21 @@ class InteractiveConfig:
 class DemonstrationConfig:
     """Expert videos as the agent's experience (beyond the paper)."""
 
-    share: float = 0.0
-    """Share of each batch that is drawn from expert videos; 0, as in the paper, uses none."""
+    fraction: float = 0.0
+    """Fraction of each batch that is drawn from expert videos; 0, as in the paper, uses none."""
 
     videos: int = 1000
     """Expert videos used so, at most; they take replay's memory a second time."""
 
-    moving_share: float = 0.8
-    """Share of the transitions drawn from expert videos in which the picture moves."""
+    moving_fraction: float = 0.8
+    """Fraction of the transitions drawn from expert videos in which the picture moves."""
 
     history_dropout: float = 0.8
-    """Share of the observations drawn from expert videos whose stack repeats its newest frame."""
+    """Fraction of the observations drawn from expert videos whose stack repeats its newest frame."""
 
-    policy_share: float = 0.5
-    """Share of the inverse dynamics' batches from steps after the warm-up, as soon as there are any: the policy moves
-    more like the expert than random actions do. The rest comes from all steps."""
+    policy_fraction: float = 0.5
+    """Fraction of the inverse dynamics' batches from steps after the warm-up, as soon as there are any: the policy
+    moves more like the expert than random actions do. The rest comes from all steps."""
 
     inverse_dynamics_updates: int = 1500
     """Gradient steps of the inverse dynamics in each Cloning Phase; the first comes when the agent's warm-up ends."""
@@ -133,9 +133,9 @@ class DemonstrationConfig:
     phases: int = 3
     """Cloning Phases of a run."""
 
-    time_share: float = 0.25
-    """With a time budget, the largest share of it that all Cloning Phases together may take, each as much as any other:
-    what is left of its gradient steps then is left out."""
+    time_fraction: float = 0.25
+    """With a time budget, the largest fraction of it that all Cloning Phases together may take, each as much as any
+    other: what is left of its gradient steps then is left out."""
 
     repeat_every: int = 1500
     """Agent steps from one Cloning Phase to the next: steps of a policy that moves like the expert teach the inverse
@@ -146,8 +146,8 @@ class DemonstrationConfig:
 
     def __post_init__(self) -> None:
         of_self = partial(fields_of, "demonstrations", self)
-        require_below_one(**of_self("share"))
-        require_share(**of_self("moving_share", "history_dropout", "policy_share", "time_share"))
+        require_below_one(**of_self("fraction"))
+        require_fraction(**of_self("moving_fraction", "history_dropout", "policy_fraction", "time_fraction"))
         counts = ("videos", "inverse_dynamics_updates", "phases", "repeat_every", "batch_size")
         require_at_least(1, **of_self(*counts))
         require_at_least(0, **of_self("cloning_updates"))

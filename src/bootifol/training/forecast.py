@@ -22,7 +22,7 @@ UPDATES = 4
 """Updates of an agent that are timed, after one that is not."""
 
 LITTLE = 0.25
-"""Below this share of the agent steps that the schedules are written for, a budget is said to be small."""
+"""Below this fraction of the agent steps that the schedules are written for, a budget is said to be small."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def forecast(run: RunConfig, parts: Parts, budget: Budget, counters: Counters) -
     config = run.training
     seconds = budget.seconds_left(counters)
     if parts.demonstrations is not None:
-        seconds -= budget.cloning_share * config.demonstrations.phases * (budget.seconds or 0.0)
+        seconds -= budget.cloning_fraction * config.demonstrations.phases * (budget.seconds or 0.0)
     costs = measured_costs(run, parts, counters)
     task, evaluation = parts.task, config.evaluation
     evaluated = evaluation.episodes * task.episode_steps + evaluation.long_episodes * task.evaluation_steps
@@ -105,9 +105,9 @@ def affordable_steps(costs: Costs, config: TrainingConfig, seconds: float, evalu
     warm_up = min(config.agent.warm_up_steps * costs.agent_step * steps, seconds)  # nothing learns yet
     at_rest = costs.agent_step * steps + costs.update / config.agent.update_every
     learning = at_rest + costs.reward_update / interactive.reward_update_every
-    # Schedules are stretched over the time, so it is a share of the time in which the reward learns.
-    share = min(interactive.reward_updates_until / max(interactive.agent_steps, 1), 1.0)
-    learned = (seconds - warm_up) * (share / learning + (1 - share) / at_rest)
+    # Schedules are stretched over the time, so it is a fraction of the time in which the reward learns.
+    fraction = min(interactive.reward_updates_until / max(interactive.agent_steps, 1), 1.0)
+    learned = (seconds - warm_up) * (fraction / learning + (1 - fraction) / at_rest)
     return int(warm_up / (costs.agent_step * steps) + learned)
 
 

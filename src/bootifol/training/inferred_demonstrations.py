@@ -2,8 +2,8 @@
 
 This goes beyond the paper, and is off by default. The agent's own steps teach an inverse-dynamics model which action
 leads from one picture to the next; it names the actions of the expert videos, the learned reward rewards them, the
-policy starts as their clone (`cloning.py`), and a share of every batch is drawn from them. Nobody gave an action or a
-reward: both are inferred from pictures.
+policy starts as their clone (`cloning.py`), and a fraction of every batch is drawn from them. Nobody gave an action
+or a reward: both are inferred from pictures.
 
 A clone of stacked pictures learns to go on as it went: what it did last is visible in the stack, and most often what
 the expert did next. At rest it then stays at rest. So of most demonstrated stacks only the newest picture is kept, and
@@ -29,14 +29,14 @@ from bootifol.training.config import DemonstrationConfig
 from bootifol.types import Arrays, Batch, Episode, Frames, FrameStates, StepMetrics, Video, VideoSource
 
 MOVING = 0.1
-"""A picture moves where it changes by more than this share of its video's largest change."""
+"""A picture moves where it changes by more than this fraction of its video's largest change."""
 
 
 class Demonstrations:
     """Expert videos with inferred actions, as a second replay beside the agent's.
 
     Args:
-        config: see there; `share` must be above 0.
+        config: see there; `fraction` must be above 0.
         expert: D_e.
         replay: empty, and large enough for the videos; filled here, or by `fill` where it keeps states.
         inverse_dynamics: what infers the actions.
@@ -98,7 +98,7 @@ class Demonstrations:
         """
         size, stored = self.config.batch_size, len(agent_replay)
         newest = min(policy_steps, stored)
-        of_policy = round(self.config.policy_share * size) if newest > 0 else 0
+        of_policy = round(self.config.policy_fraction * size) if newest > 0 else 0
         drawn = np.concatenate(
             [
                 rng.integers(0, stored, size - of_policy),
@@ -118,7 +118,7 @@ class Demonstrations:
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
         """Transitions of the expert videos, most of them where the picture moves."""
-        moving = round(batch_size * self.config.moving_share)
+        moving = round(batch_size * self.config.moving_fraction)
         moving = batch_size if not len(self._still) else moving if len(self._moving) else 0
         drawn = np.concatenate(
             [rng.choice(self._moving, moving), rng.choice(self._still, batch_size - moving)]
@@ -128,8 +128,8 @@ class Demonstrations:
         )
 
     def mixed(self, agent_replay: ReplayBuffer, batch_size: int, rng: np.random.Generator) -> Batch:
-        """A batch of which `share` comes from the expert videos."""
-        demonstrated = max(round(self.config.share * batch_size), 1)
+        """A batch of which `fraction` comes from the expert videos."""
+        demonstrated = max(round(self.config.fraction * batch_size), 1)
         own = agent_replay.sample(batch_size - demonstrated, rng)
         shown = self.sample(demonstrated, rng)
         joined = {

@@ -21,6 +21,7 @@ from bootifol.errors import (
     shortened,
 )
 from bootifol.files import read_json, write_json
+from bootifol.old_names import with_todays_names
 from bootifol.plugins import require_trust
 from bootifol.tasks import Task, task_named
 from bootifol.training.config import TrainingConfig
@@ -145,23 +146,26 @@ def require_time_to_act(config: TrainingConfig) -> None:
     """Acting and learning get half of a time budget at least, in runs that begin.
 
     Raises:
-        BootifolError: the shares of the other phases leave less.
+        BootifolError: the fractions of the other phases leave less.
     """
-    alignment, cloning = config.alignment.time_share, config.demonstrations.time_share
-    if config.demonstrations.share > 0 and alignment + cloning > MOST_BEFORE_ACTING:
+    alignment, cloning = config.alignment.time_fraction, config.demonstrations.time_fraction
+    if config.demonstrations.fraction > 0 and alignment + cloning > MOST_BEFORE_ACTING:
         raise BootifolError(
-            f"alignment.time_share {alignment:g} and demonstrations.time_share {cloning:g} of the time budget leave "
-            "less than half for acting and learning: lower one of them"
+            f"alignment.time_fraction {alignment:g} and demonstrations.time_fraction {cloning:g} of the time budget "
+            "leave less than half for acting and learning: lower one of them"
         )
 
 
 def todays_fields(data: Any, path: Path) -> Any:
-    """A configuration's fields under today's names: `tensorboard`, true or false, became `tracker`.
+    """A configuration's fields under today's names (`old_names.py`); `tensorboard`, true or false, became `tracker`.
 
     Raises:
         BootifolError: an old field has a value that it could not have.
     """
-    if not isinstance(data, dict) or "tensorboard" not in data:
+    if not isinstance(data, dict):
+        return data
+    data = with_todays_names(data)
+    if "tensorboard" not in data:
         return data
     wanted = _checked(data["tensorboard"], bool, "tensorboard", path)
     others = {name: value for name, value in data.items() if name != "tensorboard"}

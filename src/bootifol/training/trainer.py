@@ -92,8 +92,8 @@ class Trainer:
             training.interactive.agent_steps,
             config.time_budget,
             training.alignment.gradient_steps,
-            training.alignment.time_share,
-            training.demonstrations.time_share / training.demonstrations.phases,
+            training.alignment.time_fraction,
+            training.demonstrations.time_fraction / training.demonstrations.phases,
         )
         self.interactive = InteractivePhase(
             self.parts,

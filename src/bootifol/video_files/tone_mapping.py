@@ -24,7 +24,7 @@ _BT709 = 1
 """Number of its primaries in ITU-T H.273."""
 
 _LUMINANCE = np.array([0.2627, 0.6780, 0.0593], np.float32)
-"""Shares of red, green and blue of BT.2020."""
+"""Fractions of red, green and blue of BT.2020."""
 
 _BT2020_TO_BT709 = np.array(
     [[1.660491, -0.587641, -0.072850], [-0.124550, 1.132900, -0.008349], [-0.018151, -0.100579, 1.118730]],
@@ -69,8 +69,8 @@ def _light(transfer: int) -> NDArray[np.float32]:
     signal = (np.arange(_LEVELS) / _SIGNAL_OF_ONE).clip(0, 1)
     if transfer == PQ:  # SMPTE ST 2084
         power = signal ** (1 / 78.84375)
-        share = np.maximum(power - 0.8359375, 0) / (18.8515625 - 18.6875 * power)
-        return (10_000 / _WHITE * share ** (1 / 0.1593017578125)).astype(np.float32)
+        fraction = np.maximum(power - 0.8359375, 0) / (18.8515625 - 18.6875 * power)
+        return (10_000 / _WHITE * fraction ** (1 / 0.1593017578125)).astype(np.float32)
     a, b, c = 0.17883277, 0.28466892, 0.55991073  # ARIB STD-B67
     return np.where(signal <= 0.5, signal**2 / 3, (np.exp((signal - c) / a) + b) / 12).astype(np.float32)
 

@@ -120,9 +120,9 @@ class BootifolConfig:
     videos_per_class: int = 16
     """n: a batch has n expert videos and n others."""
 
-    spoiled_share: float = 0.0
-    """Beyond the paper: share of the other videos that are expert videos spoiled in time (`spoiled.py`); 0, as in the
-    paper, none."""
+    time_corrupted_fraction: float = 0.0
+    """Beyond the paper: fraction of the other videos that are expert videos corrupted in time (`time_corrupted.py`); 0,
+    as in the paper, none."""
 
     frames_per_video: int | None = None
     """Frames of each video on which L_S, L_triplet and L_ae are computed, drawn anew every step; none (the paper)
@@ -158,7 +158,7 @@ class BootifolConfig:
         losses = ("multiview", "triplet", "autoencoder", "prediction", "sequence")
         require_at_least(0, **of_self("margin", *(f"{loss}_weight" for loss in losses)))
         require_positive(**of_self("temperature", "soft_min_temperature", "learning_rate"))
-        require_below_one(**of_self("spoiled_share", "frame_drop", "leak"))
+        require_below_one(**of_self("time_corrupted_fraction", "frame_drop", "leak"))
         of_backbone = ("triplet", "prediction", "sequence")
         learned = of_backbone if self.backbone else losses
         if not any(getattr(self, f"{loss}_weight") for loss in learned):

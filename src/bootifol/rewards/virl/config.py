@@ -12,8 +12,8 @@ from bootifol.errors import (
     require_at_least,
     require_below_one,
     require_choices,
+    require_fraction,
     require_positive,
-    require_share,
 )
 
 NAME = "ViRL"
@@ -72,10 +72,10 @@ class VirlConfig:
     margin: float = 1.0
     """rho of both triplet losses."""
 
-    altered_share: float = 0.5
+    altered_fraction: float = 0.5
     """Chance that an anchor's positive and negative are altered copies of itself; otherwise the positive is another
     video of its class, and the negative one of the other class. The paper's main text has both kinds and gives no
-    share."""
+    fraction."""
 
     noise: float = 0.05
     """Standard deviation of the noise added to a positive copy; pictures lie in [0, 1]."""
@@ -111,7 +111,7 @@ class VirlConfig:
         weights = ("sequence_triplet", "frame_triplet", "sequence_reconstruction", "frame_reconstruction")
         require_at_least(0, **of_self("noise", *(f"{loss}_weight" for loss in weights)))
         require_positive(**of_self("margin", "learning_rate"))
-        require_share(**of_self("altered_share"))
+        require_fraction(**of_self("altered_fraction"))
         require_below_one(**of_self("frame_drop", "leak"))
         if not self.sequence_triplet_weight + self.frame_triplet_weight > 0:
             raise BootifolError(

@@ -21,7 +21,7 @@ FEWEST_FRAMES = 4
 """Shorter videos have no order that could be spoiled."""
 
 CHANGED_FRAMES = 0.1
-"""Share of the frames that a positive copy swaps or shows twice; the paper's main text gives none."""
+"""Fraction of the frames that a positive copy swaps or shows twice; the paper's main text gives none."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def draw(config: VirlConfig, frames: int, rng: np.random.Generator) -> Draw:
     kept = _kept(config, frames, rng)
     length = len(kept)
     in_order = np.arange(length)
-    altered = rng.random(2 * n) < config.altered_share
+    altered = rng.random(2 * n) < config.altered_fraction
     positives = np.concatenate([np.roll(np.arange(n), -1), n + np.roll(np.arange(n), -1)])
     negatives = np.roll(np.arange(2 * n), n)
     positive_frames = np.tile(in_order, (2 * n, 1))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
-from bootifol.errors import fields_of, require_at_least, require_choices, require_positive, require_share
+from bootifol.errors import fields_of, require_at_least, require_choices, require_fraction, require_positive
 
 CAPTIONS = {
     "loss/frame": (
@@ -70,8 +70,8 @@ class FrameConfig:
     frames_per_class: int = 96
     """Frames of either class in a gradient step of the Interactive Phase."""
 
-    random_share: float = 0.33
-    """Share of random videos among the frames that are not the expert's in the Interactive Phase; the rest is the
+    random_fraction: float = 0.33
+    """Fraction of random videos among the frames that are not the expert's in the Interactive Phase; the rest is the
     agent's."""
 
     width: int = 16
@@ -106,4 +106,4 @@ class FrameConfig:
         require_at_least(1, **of_self("frames_per_class", "width", "hidden_dim"))
         require_at_least(2, **of_self("videos_per_class", "moments"))
         require_positive(**of_self("temperature", "learning_rate", "head_learning_rate"))
-        require_share(**of_self("random_share", "late_from"))
+        require_fraction(**of_self("random_fraction", "late_from"))

@@ -81,7 +81,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
             self._expert = self._some_states(expert, EXPERT_FRAMES)
         random = self._random_states()
         count = self.config.frames_per_class
-        of_random = round(self.config.random_share * count) if len(random) else 0
+        of_random = round(self.config.random_fraction * count) if len(random) else 0
         videos = agent.sample_features(count - of_random, self._rng)
         rows = np.arange(len(videos))
         of_agent = videos[rows, self._rng.integers(videos.shape[1], size=len(videos))]

@@ -1,4 +1,4 @@
-"""Expert videos spoiled in time: failures that move as smoothly as the expert and look just like it.
+"""Expert videos corrupted in time: failures that move as smoothly as the expert and look just like it.
 
 Beyond the paper. What tells an expert's video from a random one at first glance is how it moves, not what it
 achieves, so the reward learns to like smooth motion. An expert that stops short of its goal, turns back or leaves it
@@ -18,7 +18,7 @@ LATEST_TURN = 0.2
 """A video stops or turns back within this part of its length, before most experts have arrived."""
 
 
-def spoiled(videos: NDArray[Scalar], rng: np.random.Generator) -> NDArray[Scalar]:
+def time_corrupted(videos: NDArray[Scalar], rng: np.random.Generator) -> NDArray[Scalar]:
     """Each video in one of three ways, drawn at random.
 
     - it stops early and stands still;

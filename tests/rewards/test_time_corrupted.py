@@ -1,10 +1,10 @@
-"""Expert videos spoiled in time: where each frame comes from."""
+"""Expert videos corrupted in time: where each frame comes from."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bootifol.rewards.bootifol.spoiled import LATEST_TURN, spoiled
+from bootifol.rewards.bootifol.time_corrupted import LATEST_TURN, time_corrupted
 
 FRAMES, COUNT = 31, 300
 LATEST = int(LATEST_TURN * (FRAMES - 1))
@@ -20,7 +20,7 @@ def numbered() -> np.ndarray:
 
 def test_three_ways_to_fail() -> None:
     videos = numbered()
-    shown = spoiled(videos, np.random.default_rng(0))
+    shown = time_corrupted(videos, np.random.default_rng(0))
     assert shown.shape == videos.shape and shown.dtype == np.uint8
     np.testing.assert_array_equal(videos, numbered())
     stopped = turned = reversed_ = 0
@@ -42,5 +42,5 @@ def test_three_ways_to_fail() -> None:
 
 def test_short_videos_and_the_same_draw_twice() -> None:
     videos = numbered()[:, :3]
-    one, two = (spoiled(videos, np.random.default_rng(1)) for _ in range(2))
+    one, two = (time_corrupted(videos, np.random.default_rng(1)) for _ in range(2))
     np.testing.assert_array_equal(one, two)
