@@ -188,7 +188,7 @@ def label_episode(config: TrainingConfig, reward: BootifolConfig, frames: int = 
     """Rewarding an episode against one expert video whose encoding is not cached yet."""
     rng = np.random.default_rng(0)
     videos = RandomVideos(2, config.pictures.video_size, rng, frames)
-    one_reference = replace(reward, references=1, aggregate="mean", motion=False)
+    one_reference = replace(reward, references=1, motion=False)
     models = in_both_precisions(one_reference, config.pictures.video_size)
     plain = PlainBootifol(reward.width_divisor)
     names = iter(range(10**9))

@@ -22,6 +22,13 @@ def test_nested_and_dotted_fields_are_renamed_and_others_stay() -> None:
     }
 
 
+def test_what_is_gone_is_left_out_where_it_said_what_is_done_today() -> None:
+    old = {"reward": {"bootifol": {"aggregate": "mean", "soft_min_temperature": 0.1, "margin": 1.0}}}
+    assert with_todays_names(old) == {"reward": {"bootifol": {"margin": 1.0}}}
+    other = {"reward": {"bootifol": {"aggregate": "min"}}}
+    assert with_todays_names(other) == other, "which the configuration then refuses by name"
+
+
 def test_every_new_name_is_a_field_and_no_old_one_is() -> None:
     for old, new in RENAMED.items():
         *sections, name = old.split(".")

@@ -67,7 +67,7 @@ def test_what_the_paper_does_not_have_is_left_out(models: list[BootifolConfig]) 
     assert models == [replace(as_in_the_paper, precision=precision) for precision in ("bf16", "fp32")]
     models.clear()
     label_episode(CONFIG, REWARD)
-    one_reference = replace(REWARD, references=1, aggregate="mean", motion=False)
+    one_reference = replace(REWARD, references=1, motion=False)
     assert models == [replace(one_reference, precision=precision) for precision in ("bf16", "fp32")]
 
 

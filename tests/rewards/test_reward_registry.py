@@ -54,7 +54,7 @@ def test_every_preset_rewards_videos_of_its_size_by_every_method(method: str, na
     ("config", "field", "sentence"),
     [
         (BootifolConfig, {"reward": "cosin"}, "bootifol: reward is cosin; use distance or cosine"),
-        (BootifolConfig, {"aggregate": "max"}, "bootifol: aggregate is max; use mean or min or soft_min"),
+        (BootifolConfig, {"reward_scale": "max"}, "bootifol: reward_scale is max; use none or alignment"),
         (VirlConfig, {"distance": "cosine"}, "virl: distance is cosine; use euclidean or squared"),
         (
             ContextTranslationConfig,

@@ -69,14 +69,7 @@ class BootifolConfig:
     one; most want pictures.video_size 224."""
 
     references: int = 1
-    """Expert videos an episode is compared with; the paper compares with one."""
-
-    aggregate: Literal["mean", "min", "soft_min"] = "mean"
-    """Over several references, at every time step: the mean reward, the reward of the nearest reference (min),
-    or a mean that weighs reference i by softmax(reward_i / soft_min_temperature)."""
-
-    soft_min_temperature: float = 0.1
-    """How soft soft_min is, in units of the distance, before `reward_scale`: 0 tends to min, infinity to mean."""
+    """Expert videos an episode is compared with; its reward is the mean at every time step. The paper has one."""
 
     reward_scale: Literal["none", "alignment"] = "none"
     """none (the paper), or alignment: 1 - distance / c_t, where c_t is the mean distance at time step t between
@@ -157,7 +150,7 @@ class BootifolConfig:
         require_at_least(1, **of_self(*counts))
         losses = ("multiview", "triplet", "autoencoder", "prediction", "sequence")
         require_at_least(0, **of_self("margin", *(f"{loss}_weight" for loss in losses)))
-        require_positive(**of_self("temperature", "soft_min_temperature", "learning_rate"))
+        require_positive(**of_self("temperature", "learning_rate"))
         require_below_one(**of_self("time_corrupted_fraction", "frame_drop", "leak"))
         of_backbone = ("triplet", "prediction", "sequence")
         learned = of_backbone if self.backbone else losses

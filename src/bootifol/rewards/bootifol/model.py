@@ -98,7 +98,7 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
             rewards = torch.nn.functional.cosine_similarity(encoding[None], compared, dim=2)
         else:
             rewards = -torch.linalg.vector_norm(encoding[None] - compared, dim=2)
-        reward = self._aggregate(rewards)
+        reward = rewards.mean(0)
         if self.config.reward_scale == "alignment" and self._scale.known:
             reward = self._scale.rewards(reward)
         return to_host(reward)
@@ -253,15 +253,6 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         dtype = torch.bfloat16 if self.config.precision == "bf16" else torch.float32
         lightness, color = lab_views(cast(Frames, frames), dtype)
         return to_device(lightness, self.device), to_device(color, self.device)
-
-    def _aggregate(self, rewards: torch.Tensor) -> torch.Tensor:
-        """Rewards by reference `[R, T]` to `[T]`."""
-        if self.config.aggregate == "mean":
-            return rewards.mean(0)
-        if self.config.aggregate == "min":
-            return rewards.amax(0)
-        weights = torch.softmax(rewards / self.config.soft_min_temperature, dim=0)
-        return (weights * rewards).sum(0)
 
     def _indices(self, indices: NDArray[np.int64]) -> torch.Tensor:
         return self._on_device(indices.reshape(-1))
