@@ -1,33 +1,30 @@
 """The results that the paper's tables are made of: every evaluation of runs, in one file.
 
-    python -m benchmarks.paper_results runs/paper --out results/paper.csv
-    python -m benchmarks.paper_results --out results/paper.csv --figure docs/images/paper_returns.png
-    python -m benchmarks.paper_results --out results/paper.csv --table
+    python -m benchmarks.paper_results results/paper --out results/paper.csv
+    python -m benchmarks.paper_results results/paper --out results/paper.csv --figure docs/images/paper_returns.png
+
+from runs, or from a collection of them (`benchmarks.collect`), which also says how each was made.
 
 A row an evaluation: task, system, cloned, seed, minutes, agent_steps, scaled_return (the mean over its episodes), and
-how many episodes there were, of how many steps, of which how many were solved. Rows of a run that is given replace its
-old ones; all others stay. A JSON file of the same name says with which command, configuration, versions and videos each
-run was made. A system is a method, with `-sequences` where BootIfOL learns the paper's objective alone; `cloned` is 1
-where the policy learned from inferred actions.
+how many episodes there were, of how many steps, of which how many were solved. A system is a method, with `-sequences`
+where BootIfOL learns the paper's objective alone; `cloned` is 1 where the policy learned from inferred actions. What
+each run ended with is printed.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Console
 
 from benchmarks.command import command
-from benchmarks.rows import Row, read_rows, write_rows
+from benchmarks.rows import Row, write_rows
 from bootifol.errors import BootifolError
 from bootifol.evaluation.summary import summarize
-from bootifol.files import read_json, written_aside
 from bootifol.reports.collection import read_runs
 from bootifol.reports.markdown import markdown_table
 from bootifol.reports.names import task_title
@@ -76,21 +73,13 @@ def rows_of(run: RunFiles) -> list[Row]:
     return rows
 
 
-def made_by(run: RunFiles) -> dict[str, Any]:
-    """How a run came about."""
-    return {
-        "command": run.command,
-        "config": dict(run.config),
-        "versions": dict(run.versions),
-        "videos": dict(run.videos),
-    }
+def all_rows(paths: Sequence[Path]) -> list[Row]:
+    """Those of all runs, by task, system and seed.
 
-
-def keep(paths: Sequence[Path], out: Path) -> list[Row]:
-    """Adds what the runs measured to the CSV file, and how they were made to the JSON file beside it."""
-    rows, origins = read_rows(out, COLUMNS), {}
-    if out.with_suffix(".json").is_file():
-        origins = dict(read_json(out.with_suffix(".json"), "how the runs were made"))
+    Raises:
+        BootifolError: two runs are of one task, system and seed.
+    """
+    rows: list[Row] = []
     seen: dict[tuple[str, ...], Path] = {}
     for run in read_runs(paths):
         new = rows_of(run)
@@ -100,15 +89,11 @@ def keep(paths: Sequence[Path], out: Path) -> list[Row]:
                 f"{run.path} and {seen[key]} are both {' '.join(key)}: give one of them, or keep them in two files"
             )
         seen[key] = run.path
-        rows = [row for row in rows if tuple(row[column] for column in KEY) != key] + new
-        origins["/".join(key)] = made_by(run)
-    rows.sort(
-        key=lambda row: (*(row[column] for column in KEY[:3]), int(row["seed"]), int(row["agent_steps"]))
+        rows += new
+    return sorted(
+        rows,
+        key=lambda row: (*(row[column] for column in KEY[:3]), int(row["seed"]), int(row["agent_steps"])),
     )
-    write_rows(out, COLUMNS, rows)
-    with written_aside(out.with_suffix(".json")) as aside:
-        aside.write_text(json.dumps(dict(sorted(origins.items())), indent=1) + "\n")
-    return rows
 
 
 def grouped(rows: Sequence[Row], columns: Sequence[str]) -> dict[tuple[str, ...], list[Row]]:
@@ -203,20 +188,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("runs", type=Path, nargs="*", help="run directories, or directories that hold some")
+    parser.add_argument("runs", type=Path, nargs="+", help="run directories, collections, or what holds some")
     parser.add_argument("--out", type=Path, required=True, help="the CSV file")
-    parser.add_argument("--figure", type=Path, help="PNG of the learning curves of all that the file holds")
-    parser.add_argument("--table", action="store_true", help="print where all that the file holds ended")
+    parser.add_argument("--figure", type=Path, help="PNG of the learning curves")
     options = parser.parse_args(arguments)
     if options.figure:
         require_png(options.figure)
-    rows = keep(options.runs, options.out) if options.runs else read_rows(options.out, COLUMNS)
-    if not rows:
-        raise BootifolError(f"{options.out} holds nothing yet: give runs")
+    rows = all_rows(options.runs)
+    write_rows(options.out, COLUMNS, rows)
     if options.figure:
         save_png(drawn(rows), options.figure)
-    if options.table:
-        Console(width=160).print(table(rows))
+    Console(width=160).print(table(rows))
 
 
 if __name__ == "__main__":

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 from benchmarks.paper_results import COLUMNS, main, system_of, table
 from benchmarks.rows import read_rows
 
+from bootifol.reports.collection import add_to_collection
 from bootifol.reports.run_files import read_run
 from reports.made_up_runs import write_run
 
 FRAMES = {"reward__bootifol__reward": "frames", "demonstrations__fraction": 0.0}
+
+
+def table_of(directory: Path, runs: Iterable[Path]) -> list[tuple[str, ...]]:
+    assert main([*map(str, runs), "--out", str(directory / "paper.csv")]) == 0
+    return kept(directory / "paper.csv")
 
 
 def kept(out: Path) -> list[tuple[str, ...]]:
@@ -28,18 +34,15 @@ def test_a_run_is_kept_under_its_task_system_and_seed(tmp_path: Path) -> None:
         ("reacher_hard", "bootifol", "0", "2", "2.0", "1000", "0.5000"),
         ("reacher_hard", "bootifol-sequences", "1", "1", "1.0", "1000", "0.8000"),
     ]
-    origins = json.loads(out.with_suffix(".json").read_text())
-    assert origins["reacher_hard/bootifol/0/2"]["config"]["reward"]["bootifol"]["reward"] == "frames"
 
 
-def test_the_same_run_again_replaces_its_rows_and_others_stay(tmp_path: Path) -> None:
-    first, again, out = tmp_path / "first", tmp_path / "again", tmp_path / "paper.csv"
-    write_run(first / "one", [10.0], seed=1, **FRAMES)
-    write_run(first / "two", [20.0], seed=2, **FRAMES)
-    write_run(again / "one", [90.0], seed=1, **FRAMES)
-    for runs in (first, again):
-        assert main([str(runs), "--out", str(out)]) == 0
-    assert [(row[3], row[6]) for row in kept(out)] == [("1", "0.9000"), ("2", "0.2000")]
+def test_a_collection_gives_the_rows_of_its_runs(tmp_path: Path) -> None:
+    runs = {
+        f"seed{seed}": write_run(tmp_path / f"{seed}", [10.0 * seed], seed=seed, **FRAMES) for seed in (1, 2)
+    }
+    add_to_collection(tmp_path / "kept", runs)
+    found = [table_of(tmp_path, paths) for paths in (runs.values(), [tmp_path / "kept"])]
+    assert found[0] == found[1] and len(found[0]) == 2
 
 
 def test_two_runs_of_one_name_are_refused_and_nothing_is_written(
@@ -61,11 +64,10 @@ def test_a_run_without_its_last_evaluation_is_called_unfinished(tmp_path: Path) 
     assert cells[3:6] == ["0.40", "0.40", "0.90 at 1,000"], "no mean over what is not finished"
 
 
-def test_the_figure_is_drawn_from_the_file_alone(tmp_path: Path) -> None:
+def test_the_figure_is_a_png(tmp_path: Path) -> None:
     out, figure = tmp_path / "paper.csv", tmp_path / "returns.png"
     write_run(tmp_path / "runs" / "one", **FRAMES)
-    assert main([str(tmp_path / "runs"), "--out", str(out)]) == 0
-    assert main(["--out", str(out), "--figure", str(figure)]) == 0
+    assert main([str(tmp_path / "runs"), "--out", str(out), "--figure", str(figure)]) == 0
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
