@@ -14,7 +14,7 @@ from bootifol.errors import BootifolError
 from bootifol.reports.names import agent_name, task_title
 from bootifol.reports.plots import draw_return_curves, looks_of
 from bootifol.reports.run_files import RunFiles, ShowcaseVideo
-from bootifol.reports.style import FAINT, KIND_COLORS, KIND_NAMES, RUN_COLORS, house_style
+from bootifol.reports.style import FAINT, KIND_COLORS, KIND_NAMES, RUN_COLORS, house_style, short_number
 from bootifol.types import Rewards, Video
 
 SHOWN_KINDS = ("expert", "agent", "random")
@@ -231,7 +231,7 @@ def draw_strip(
     axes.tick_params(axis="x", labelbottom=False, length=0)
     for spine in axes.spines.values():
         spine.set_visible(False)
-    total = "" if video.environment_return is None else f"\nreturn {video.environment_return:.3g}"
+    total = "" if video.environment_return is None else f"\nreturn {short_number(video.environment_return)}"
     axes.text(
         -0.008,
         0.5,

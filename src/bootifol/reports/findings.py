@@ -16,6 +16,7 @@ from bootifol.evaluation.tables import EvaluationRow, RankingRow
 from bootifol.reports.final_return import FinalReturn, final_return
 from bootifol.reports.names import hears_reward
 from bootifol.reports.run_files import ALIGNMENT, CLONING, INTERACTIVE, RunFiles
+from bootifol.reports.style import short_number
 
 Verdict = Literal["good", "fair", "poor"]
 Direction = Literal["up", "down", "unclear"]
@@ -32,12 +33,6 @@ LEAST_OF_A_PHASE = 0.5
 
 FEWEST_REWARDS = 20
 """Records of the learned reward; a quarter is five."""
-
-
-def short_number(value: float) -> str:
-    """A value for reading: three digits that count, and a real minus sign."""
-    text = f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
-    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def _percent(value: float) -> str:

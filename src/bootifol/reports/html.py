@@ -22,12 +22,12 @@ from bootifol.reports.collection import read_runs
 from bootifol.reports.comparison import compare
 from bootifol.reports.film_strip import SHOWN_KINDS, reward_above_film_strip, videos_of_start
 from bootifol.reports.final_return import FinalReturn, final_return
-from bootifol.reports.findings import Finding, findings, scores_or_none, short_number
+from bootifol.reports.findings import Finding, findings, scores_or_none
 from bootifol.reports.names import task_title
 from bootifol.reports.plots import RunLook, common_length, looks_of
 from bootifol.reports.result_tables import fixed_number
 from bootifol.reports.run_files import COUNTERS, RunFiles, flattened
-from bootifol.reports.style import KIND_COLORS, svg_data_uri, thousands
+from bootifol.reports.style import KIND_COLORS, short_number, svg_data_uri, thousands
 from bootifol.rewards.config import CAPTIONS
 from bootifol.types import AnyPath
 
@@ -337,15 +337,17 @@ def _video_rows(run: RunFiles) -> list[list[PlayedVideo]]:
             if path is None:
                 continue
             shown = run.showcase.get((kind, start))
-            known = shown is not None and shown.environment_return is not None
+            detail = ""
+            if shown is not None and shown.environment_return is not None:
+                detail = (
+                    f"return {short_number(shown.environment_return)} in {len(shown.rewards)} agent steps"
+                )
             row.append(
                 PlayedVideo(
                     kind=kind,
                     color=KIND_COLORS[kind],
                     source="data:video/mp4;base64," + base64.b64encode(path.read_bytes()).decode("ascii"),
-                    detail=f"return {shown.environment_return:.3g} in {len(shown.rewards)} agent steps"
-                    if shown is not None and known
-                    else "",
+                    detail=detail,
                 )
             )
         rows.append(row)

@@ -28,13 +28,13 @@ from bootifol.files import write_json, written_aside
 from bootifol.progress import duration
 from bootifol.reports.film_strip import reward_above_film_strip, videos_of_start
 from bootifol.reports.final_return import FinalReturn, final_return
-from bootifol.reports.findings import findings, short_number
+from bootifol.reports.findings import findings
 from bootifol.reports.markdown import markdown_table
 from bootifol.reports.names import agent_name, hears_reward, task_title
 from bootifol.reports.plots import looks_of, return_curves
 from bootifol.reports.result_tables import fixed_number
 from bootifol.reports.run_files import CLONING, RunFiles, flattened, read_run
-from bootifol.reports.style import KIND_NAMES, save_png
+from bootifol.reports.style import KIND_NAMES, save_png, short_number
 
 POLICY = "policy.safetensors"
 CARD = "README.md"

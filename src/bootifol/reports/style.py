@@ -150,6 +150,12 @@ def step_axis(axes: Axes, label: str) -> None:
     axes.margins(x=0.02)
 
 
+def short_number(value: float) -> str:
+    """A value for reading: three digits that count, and a real minus sign."""
+    text = f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
 def thousands(value: float) -> str:
     """A count, short: 950, 12K, 1.55M."""
     for size, letter in ((1_000_000, "M"), (1_000, "K")):
