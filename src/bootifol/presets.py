@@ -115,7 +115,7 @@ LONG = replace(
     evaluation=replace(CPU.evaluation, every=25_000),
 )
 """`cpu` with an evening's time: the paper's 1.55M agent steps in about two and a half hours of one core, with smaller
-updates and fewer of them (docs/performance.md)."""
+updates and fewer of them."""
 
 BACKBONE = TrainingConfig(
     pictures=PictureConfig(video_size=224, profile="full"),
