@@ -42,7 +42,6 @@ def variants(config: BootifolConfig) -> dict[str, BootifolConfig]:
     """The preset's reward model, and others by name."""
     return {
         "preset": config,
-        "time_corrupted_fraction 0.5": replace(config, time_corrupted_fraction=0.5),
         "without motion": replace(config, motion=False),
         "without sequence_times": replace(config, sequence_times=1),
         "without both: the paper's network": replace(config, motion=False, sequence_times=1),

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from benchmarks.command import command
 from benchmarks.rows import Row, write_rows
 from benchmarks.task_rankings import Setup, aligned, recorded
-from bootifol.demos.augmentation import AugmentationConfig, augmented
+from bootifol.demos.augmentation import augmented
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.export_videos import export_videos
 from bootifol.demos.import_videos import Conversion, import_videos
@@ -96,8 +96,8 @@ def measure(setup: Setup, task_name: str, demos: Path, workers: int) -> list[Row
         for kind, files in ((kind, through_mp4(place / "held_out", kind)) for kind in KINDS)
     }
     rows: list[Row] = []
-    for name, config in (("never", None), ("always", AugmentationConfig("always"))):
-        model = aligned(task, setup, augmented(expert, config), augmented(training["random"], config))
+    for name, varied in (("never", False), ("always", True)):
+        model = aligned(task, setup, augmented(expert, varied), augmented(training["random"], varied))
         about = {
             "task": task_name,
             "preset": setup.preset,

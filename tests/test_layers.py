@@ -40,6 +40,7 @@ SHARED = {
     "old_names",
     "optim",
     "plugins",
+    "settings",
 }
 """Modules without a place in the order: everyone may import them."""
 

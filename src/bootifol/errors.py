@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import reprlib
-import typing
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -91,12 +89,6 @@ def collected_warnings() -> Iterator[list[BootifolWarning]]:
             warnings.warn_explicit(found.message, found.category, found.filename, found.lineno)
 
 
-def fields_of(what: str, config: object, *names: str) -> dict[str, float]:
-    """A configuration's numbers by the names that sentences give them; fields that are None are left out."""
-    values = {f"{what}: {name}": getattr(config, name) for name in names}
-    return {name: value for name, value in values.items() if value is not None}
-
-
 def require_at_least(minimum: float, **fields: float) -> None:
     """Refuses numbers below a minimum; infinity and NaN, too.
 
@@ -117,71 +109,3 @@ def require_at_most(maximum: float, **fields: float) -> None:
     for name, value in fields.items():
         if not value <= maximum:
             raise BootifolError(f"{name} must be at most {maximum:,}, not {shortened(value)}")
-
-
-def require_reasonable(of: str, config: object) -> None:
-    """Refuses whole numbers above `LARGEST_COUNT` and numbers that are not finite, in a configuration and in those
-    inside it.
-
-    Args:
-        of: the configuration's name, or nothing.
-        config: a dataclass.
-
-    Raises:
-        BootifolError: names the field, dotted as on the command line.
-    """
-    for field in dataclasses.fields(config):  # type: ignore[arg-type]
-        name, value = f"{of}.{field.name}".lstrip("."), getattr(config, field.name)
-        if dataclasses.is_dataclass(value):
-            require_reasonable(name, value)
-        elif isinstance(value, int | float) and not -LARGEST_COUNT <= value <= LARGEST_COUNT:
-            raise BootifolError(f"{name} is {shortened(value)}, beyond all that is possible: choose another")
-
-
-def require_positive(**fields: float) -> None:
-    """Refuses numbers that are not above 0; infinity and NaN, too.
-
-    Raises:
-        BootifolError: names the first such field.
-    """
-    for name, value in fields.items():
-        if not 0 < value < math.inf:
-            raise BootifolError(f"{name} must be positive, not {value}")
-
-
-def require_fraction(**fields: float) -> None:
-    """Refuses numbers outside of [0, 1].
-
-    Raises:
-        BootifolError: names the first such field.
-    """
-    for name, value in fields.items():
-        if not 0 <= value <= 1:
-            raise BootifolError(f"{name} must lie in [0, 1], not {value}")
-
-
-def require_below_one(**fields: float) -> None:
-    """Refuses numbers outside of [0, 1).
-
-    Raises:
-        BootifolError: names the first such field.
-    """
-    for name, value in fields.items():
-        if not 0 <= value < 1:
-            raise BootifolError(f"{name} must lie in [0, 1), not {value}")
-
-
-def require_choices(of: str, config: object) -> None:
-    """Refuses a value that is none of its field's choices (a Literal), which Python itself lets pass.
-
-    Args:
-        of: what the configuration is of, for the sentence.
-        config: a dataclass.
-
-    Raises:
-        BootifolError: names the field and its choices.
-    """
-    for field, kind in typing.get_type_hints(type(config)).items():
-        if typing.get_origin(kind) is typing.Literal and getattr(config, field) not in typing.get_args(kind):
-            choices = " or ".join(typing.get_args(kind))
-            raise BootifolError(f"{of}: {field} is {getattr(config, field)}; use {choices}")

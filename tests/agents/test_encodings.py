@@ -91,5 +91,7 @@ def test_updates_and_clones_train_the_mlp() -> None:
 def test_without_a_model_there_is_nothing_to_see() -> None:
     with pytest.raises(BootifolError, match=r"agent\.observations encodings needs a reward model"):
         DrQv2(CONFIG, SIZE, STACK, 2, seed=0)
-    with pytest.raises(BootifolError, match="agent: observations is words; use pictures or encodings"):
+    with pytest.raises(
+        BootifolError, match=r"agent\.observations must be pictures, encodings or states, not"
+    ):
         dataclasses.replace(CONFIG, observations="words")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from benchmarks import cloning, gallery
+from benchmarks import gallery
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.evaluation.ranking import KINDS
@@ -68,15 +68,6 @@ def test_backbone(
     assert run_benchmark("backbone", tiny_backbone, "--size", "32", "--frames", "2", "--runs", "1") == 0
     said = capsys.readouterr().out
     assert "tiny-efficientnet" in said and " 32 " in said
-
-
-def test_cloning(run_benchmark: RunBenchmark, capsys: pytest.CaptureFixture[str]) -> None:
-    size = ("--videos", "2", "--updates", "2", "--episodes", "1", "--out", "clones.csv")
-    words = ("--task", "drawn_reach", "--preset", "smoke", *size)
-    assert run_benchmark("cloning", *words) == 0
-    rows = Path("clones.csv").read_text().splitlines()
-    assert rows[0].startswith("variant,seed,updates,cloning_loss,mean_return")
-    assert len(rows) == 1 + len(cloning.VARIANTS)
 
 
 def test_gallery(run_benchmark: RunBenchmark, monkeypatch: pytest.MonkeyPatch) -> None:

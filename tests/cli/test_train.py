@@ -179,7 +179,7 @@ def test_the_printed_configuration_is_the_same_one_read_back(
     ("text", "sentence"),
     [
         ("agent: {batchsize: 3}", "there is no field 'agent.batchsize'; the nearest is agent.batch_size"),
-        ("agent: {batch_size: -3}", "agent: batch_size must be at least 1, not -3"),
+        ("agent: {batch_size: -3}", "agent.batch_size must be at least 1, not -3"),
         ("preset: gpu", "there is no preset 'gpu'"),
         ("task: my_robot:make", "names the task 'my_robot:make', which is code of its author's"),
         (

@@ -218,17 +218,17 @@ def test_a_set_larger_than_memory_is_sampled_in_bounded_memory(write_set: WriteS
     ("fields", "sentence"),
     [
         ({"format": 2}, "has format 2 and this bootifol reads format 1"),
-        ({"frames": "5"}, "'frames' should be a whole number"),
+        ({"frames": "5"}, "frames must be a whole number"),
         (
             {"frames": 6},
             r"shard-00000.npy holds uint8 \[3, 5, 8, 8, 3\] where the manifest says uint8 \[3, 6",
         ),
         ({"video_size": 4}, "where the manifest says"),
         ({"videos": []}, "its shards hold 4 videos and it lists 0"),
-        ({"videos": {}}, "'videos' should be a list"),
+        ({"videos": {}}, "videos must be a list"),
         ({"episodes": 5}, "it lists 4 videos of 5"),
         ({"complete": False, "episodes": 9}, r"unfinished \(4 of 9 videos\)"),
-        ({"frames_per_second": 0}, "'frames_per_second' should be a positive number"),
+        ({"frames_per_second": 0}, "frames_per_second must be above 0"),
     ],
 )
 def test_a_wrong_manifest_gives_a_sentence(

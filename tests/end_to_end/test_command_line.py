@@ -173,7 +173,7 @@ def test_ones_own_videos_are_enough(demos: Path, tmp_path: Path, monkeypatch: py
         (["train", "--demos", "x", "--out", "y", "--time-budget", "soon"], "'soon' is not a duration"),
         (
             ["train", "--agent.discount", "2", "--demos", "x", "--out", "y"],
-            "discount must lie in [0, 1], not 2",
+            "agent.discount must be at most 1, not 2",
         ),
         (["evaluate", "nowhere"], "nowhere is not a run"),
         (["score", "nowhere", "video.mp4"], "nowhere is not a run"),

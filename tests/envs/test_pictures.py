@@ -8,10 +8,10 @@ from bootifol.errors import BootifolError
 @pytest.mark.parametrize(
     ("fields", "sentence"),
     [
-        ({"agent_size": 7}, "agent_size must lie in 8 … 1024 pixels, not 7"),
-        ({"video_size": 2000}, "video_size must lie in 8 … 1024 pixels, not 2000"),
-        ({"stack": 0}, "stack must be at least 1 frame, not 0"),
-        ({"profile": "pretty"}, "profile must be fast, balanced or full, not 'pretty'"),
+        ({"agent_size": 7}, "agent_size must be at least 8, not 7"),
+        ({"video_size": 2000}, "video_size must be at most 1,024, not 2000"),
+        ({"stack": 0}, "stack must be at least 1, not 0"),
+        ({"profile": "pretty"}, r"pictures\.profile must be fast, balanced or full, not 'pretty'"),
     ],
 )
 def test_impossible_pictures_are_refused_with_a_sentence(fields: dict[str, object], sentence: str) -> None:

@@ -59,26 +59,6 @@ def test_a_video_handed_out_does_not_change_when_its_slot_is_overwritten() -> No
     np.testing.assert_array_equal(batch[0], before)
 
 
-def test_only_failures_are_drawn_where_so_it_is_asked_for() -> None:
-    ring = AgentVideos(4, FRAMES, SIZE, failures_fraction=0.5)
-    frames = moving_videos(4)
-    for index, reward in enumerate([0.9, 0.1, 0.8, 0.2]):
-        ring.add(Video(f"agent-{index}", frames[index]), reward)
-
-    def drawn(count: int) -> set[bytes]:
-        return {video.tobytes() for video in ring.sample(count, np.random.default_rng(0))}
-
-    assert drawn(2) == {frames[1].tobytes(), frames[3].tobytes()}
-    ring.reward_anew(1, 1.0)
-    assert drawn(2) == {frames[2].tobytes(), frames[3].tobytes()}
-    assert len(drawn(3)) == 3, "never fewer than asked for, where there are so many"
-    restored = AgentVideos(4, FRAMES, SIZE, failures_fraction=0.5)
-    restored.load_state(ring.state())
-    np.testing.assert_array_equal(
-        restored.sample(2, np.random.default_rng(3)), ring.sample(2, np.random.default_rng(3))
-    )
-
-
 def test_it_draws_only_what_was_added() -> None:
     ring = filled(8, 3)
     added = {frames.tobytes() for frames in moving_videos(3)}

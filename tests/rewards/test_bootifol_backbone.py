@@ -124,7 +124,7 @@ def test_future_frames_leave_past_rewards_untouched(
 def test_resumed_training_is_bit_for_bit_the_uninterrupted_one(
     config: BootifolConfig, expert: WithFeatures, other: WithFeatures, precision: str
 ) -> None:
-    config = replace(config, precision=precision, motion=True, time_corrupted_fraction=0.4)  # type: ignore[arg-type]
+    config = replace(config, precision=precision, motion=True)  # type: ignore[arg-type]
     straight, stopped, resumed = (BootifolRewardModel(config, SIZE, seed) for seed in (0, 0, 9))
     learn(straight, 4, expert, other)
     learn(stopped, 2, expert, other)

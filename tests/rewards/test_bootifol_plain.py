@@ -15,7 +15,6 @@ from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.model import BootifolRewardModel
 from bootifol.rewards.bootifol.sampling import draw
 from bootifol.rewards.bootifol.scale import DistanceScale
-from bootifol.rewards.bootifol.time_corrupted import time_corrupted
 from bootifol.types import FrameBatch, Video
 
 CONFIG = BootifolConfig(width_divisor=16, videos_per_class=3)
@@ -75,24 +74,18 @@ class FirstVideos(DotVideos):
         return self.videos[:count]
 
 
-@pytest.mark.parametrize("time_corrupted_count", [0, 1])
-def test_the_reward_scale_is_of_plain_distances(time_corrupted_count: int) -> None:
-    """Of expert and other videos, but not of time-corrupted ones."""
-    config = replace(
-        CONFIG, reward_scale="alignment", frame_drop=0.2, time_corrupted_fraction=time_corrupted_count / 3
-    )
+def test_the_reward_scale_is_of_plain_distances() -> None:
+    config = replace(CONFIG, reward_scale="alignment", frame_drop=0.2)
     model, plain = twins(config)
     expert, other = (FirstVideos(name, name == "other", size=64) for name in ("expert", "other"))
     steps, rng, scale = model.align(expert, other), np.random.default_rng(0), DistanceScale()
     for _ in range(2):
         take_parameters(plain, model)
         videos = np.concatenate([expert.videos[:3], other.videos[:3]])
-        if time_corrupted_count:
-            videos[5:] = time_corrupted(expert.videos[:1], rng)
         kept = draw(config, 6, 12, rng).kept
         assert len(kept) < 12
         ones, others = plain_encodings(plain, videos[:, kept]).chunk(2)
-        distances = torch.linalg.vector_norm(ones - others, dim=2)[: 3 - time_corrupted_count].mean(0)
+        distances = torch.linalg.vector_norm(ones - others, dim=2).mean(0)
         scale.observe(kept, distances.double().numpy())
         next(steps)
     np.testing.assert_allclose(model.state()["reward_scale"], scale.means, rtol=1e-3)

@@ -175,12 +175,11 @@ def test_pictures_that_cannot_be_halved_four_times_are_refused() -> None:
         ("frames_per_pair", 0),
         ("width_divisor", 0),
         ("width_divisor", 64),
-        ("leak", 1.0),
         ("learning_rate", 0.0),
     ],
 )
 def test_bad_configurations_are_refused_with_a_sentence(field: str, value: float) -> None:
-    with pytest.raises(BootifolError, match=f"context translation: {field}"):
+    with pytest.raises(BootifolError, match=rf"reward\.context_translation\.{field}"):
         replace(ContextTranslationConfig(), **{field: value})
 
 
@@ -190,6 +189,6 @@ def test_the_defaults_are_the_papers() -> None:
     assert [layer.out_channels for layer in networks.frame_encoder.strided] == [64, 128, 256, 512]
     assert [layer.out_channels for layer in networks.decoder.strided] == [256, 128, 64, 3]
     assert networks.translator.layers[0].out_features == networks.frame_encoder.output.out_features == 1024
-    assert (config.references, config.image_weight, config.learning_rate, config.leak) == (10, 1.0, 1e-4, 0.2)
+    assert (config.references, config.image_weight, config.learning_rate) == (10, 1.0, 1e-4)
     # The release: half the summed squares over 48x48 pictures, 1000 times the mean over features, batches of 100.
     assert config.alignment_weight == pytest.approx(1000 / (0.5 * 100 * 48 * 48 * 3), rel=0.01)

@@ -16,7 +16,7 @@ from bootifol.rewards.bootifol.frames.model import FrameRewardModel
 from bootifol.types import FrameBatch, Video
 
 SIZE, FRAMES = 32, 12
-SMALL = FrameConfig(videos_per_class=8, frames_per_class=32, width=8, hidden_dim=32)
+SMALL = FrameConfig(videos_per_class=8, frames_per_class=32, width=8)
 
 
 class Reaches:

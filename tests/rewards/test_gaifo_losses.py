@@ -21,17 +21,11 @@ def test_a_discriminator_that_knows_nothing_has_two_log_two() -> None:
     assert losses.discriminator_loss(torch.zeros(5), torch.zeros(3)).item() == pytest.approx(2 * math.log(2))
 
 
-@pytest.mark.parametrize(
-    ("kind", "expected"),
-    [
-        ("softplus", [math.log(4), math.log(2), math.log(4 / 3)]),  # -log(1 - D) for D = 3/4, 1/2, 1/4
-        ("log_sigmoid", [math.log(3 / 4), math.log(1 / 2), math.log(1 / 4)]),
-        ("logit", [math.log(3), 0.0, -math.log(3)]),
-    ],
-)
-def test_rewards_by_hand(kind: str, expected: list[float]) -> None:
+def test_rewards_by_hand() -> None:
+    """-log(1 - D) for D = 3/4, 1/2, 1/4."""
     logits = torch.tensor([math.log(3), 0.0, -math.log(3)])
-    assert losses.reward(logits, kind).tolist() == pytest.approx(expected, rel=1e-6)
+    expected = [math.log(4), math.log(2), math.log(4 / 3)]
+    assert losses.reward(logits).tolist() == pytest.approx(expected, rel=1e-6)
 
 
 def test_all_agree_with_the_slow_version_from_the_equations() -> None:
@@ -41,14 +35,8 @@ def test_all_agree_with_the_slow_version_from_the_equations() -> None:
     of_other = sum(-math.log(1 - sigmoid(x)) for x in other.tolist()) / 9
     loss = losses.discriminator_loss(expert, other)
     assert loss.item() == pytest.approx(of_expert + of_other, rel=1e-5)
-    plain = {
-        "softplus": lambda x: -math.log(1 - sigmoid(x)),
-        "log_sigmoid": lambda x: math.log(sigmoid(x)),
-        "logit": lambda x: math.log(sigmoid(x)) - math.log(1 - sigmoid(x)),
-    }
-    for kind, equation in plain.items():
-        expected = [equation(x) for x in expert.tolist()]
-        assert losses.reward(expert, kind).tolist() == pytest.approx(expected, rel=1e-4)
+    expected = [-math.log(1 - sigmoid(x)) for x in expert.tolist()]
+    assert losses.reward(expert).tolist() == pytest.approx(expected, rel=1e-4)
 
 
 def test_sure_discriminators_stay_finite_and_low_precision_is_summed_in_float32() -> None:
@@ -56,5 +44,4 @@ def test_sure_discriminators_stay_finite_and_low_precision_is_summed_in_float32(
     loss = losses.discriminator_loss(sure, sure)
     assert loss.dtype == torch.float32
     assert loss.item() == pytest.approx(500.0)
-    for kind in ("softplus", "log_sigmoid", "logit"):
-        assert torch.isfinite(losses.reward(sure, kind)).all()
+    assert torch.isfinite(losses.reward(sure)).all()

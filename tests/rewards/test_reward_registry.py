@@ -53,15 +53,18 @@ def test_every_preset_rewards_videos_of_its_size_by_every_method(method: str, na
 @pytest.mark.parametrize(
     ("config", "field", "sentence"),
     [
-        (BootifolConfig, {"reward": "cosin"}, "bootifol: reward is cosin; use distance or cosine"),
-        (BootifolConfig, {"reward_scale": "max"}, "bootifol: reward_scale is max; use none or alignment"),
-        (VirlConfig, {"distance": "cosine"}, "virl: distance is cosine; use euclidean or squared"),
+        (
+            BootifolConfig,
+            {"reward": "cosin"},
+            r"reward\.bootifol\.reward must be distance, cosine or frames",
+        ),
+        (BootifolConfig, {"reward_scale": "max"}, r"reward_scale must be none or alignment"),
         (
             ContextTranslationConfig,
             {"reward_unit": "mean"},
-            "context translation: reward_unit is mean; use none",
+            r"reward\.context_translation\.reward_unit must be none or expert",
         ),
-        (GaifoConfig, {"precision": "fp16"}, "gaifo: precision is fp16; use fp32 or bf16"),
+        (GaifoConfig, {"precision": "fp16"}, r"reward\.gaifo\.precision must be fp32 or bf16"),
         (
             BootifolConfig,
             {

@@ -70,13 +70,9 @@ def test_other_methods_fields_do_not_matter(tmp_path: Path) -> None:
 def test_a_run_that_is_older_than_a_field_has_its_default(tmp_path: Path) -> None:
     write_config(tmp_path)
     header = json.loads((tmp_path / "config.json").read_text())
-    del header["config"]["reward"]["bootifol"]["time_corrupted_fraction"]
+    del header["config"]["reward"]["bootifol"]["predicted_states"]
     (tmp_path / "config.json").write_text(json.dumps(header))
     check_is_planned(RUN, tmp_path)
-    spoiled = dataclasses.replace(
-        RUN, overrides=(*OVERRIDES, ("reward.bootifol.time_corrupted_fraction", 0.5))
-    )
-    with pytest.raises(
-        BootifolError, match=r"begun with reward\.bootifol\.time_corrupted_fraction 0\.0, and .* has 0\.5"
-    ):
+    spoiled = dataclasses.replace(RUN, overrides=(*OVERRIDES, ("reward.bootifol.predicted_states", 3)))
+    with pytest.raises(BootifolError, match=r"begun with reward\.bootifol\.predicted_states 2, and .* has 3"):
         check_is_planned(spoiled, tmp_path)

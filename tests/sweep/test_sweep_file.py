@@ -175,8 +175,14 @@ def test_code_that_a_file_names_wants_trust(tmp_path: Path) -> None:
             "{tasks: drawn_home, variants: {a: {agent.size: 3}}}",
             r"there is no field 'agent\.size'; the nearest is agent\.batch_size",
         ),
-        ("{tasks: drawn_home, variants: {a: {agent.batch_size: big}}}", r"agent\.batch_size cannot be 'big'"),
-        ("{tasks: drawn_home, variants: {a: {agent.batch_size: 1.5}}}", r"agent\.batch_size cannot be 1\.5"),
+        (
+            "{tasks: drawn_home, variants: {a: {agent.batch_size: big}}}",
+            r"must be a whole number, not 'big'",
+        ),
+        (
+            "{tasks: drawn_home, variants: {a: {agent.batch_size: 1.5}}}",
+            r"must be a whole number, not 1\.5",
+        ),
         (
             "{tasks: drawn_home, variants: {a: {threads: 2}}}",
             "the variant a sets threads: those of a run are",

@@ -116,12 +116,12 @@ def test_a_file_of_before_trackers_is_read(tmp_path: Path) -> None:
         ("[" * 5000, "nested too deeply"),
         ("sead: 3", "there is no field 'sead'; the nearest is seed"),
         ("demonstration: {fraction: 0}", "there is no field 'demonstration'; the nearest is demonstrations"),
-        ("seed: one", "seed cannot be 'one'"),
+        ("seed: one", "seed must be a whole number, not 'one'"),
         ("time_budget: soon", "time_budget: 'soon' is not a duration"),
         ("format: 9", "is of format 9, and this version reads 1"),
         ("config: 3", "config holds the fields of a run and cannot be 3"),
         ("config: {threads: 1}\nthreads: 2", "threads stands both in config and beside it"),
-        ("config: {tensorboard: maybe}", "says that tensorboard is 'maybe'"),
+        ("config: {tensorboard: maybe}", "tensorboard must be true or false, not 'maybe'"),
     ],
 )
 def test_a_bad_file_is_a_sentence_with_its_name(tmp_path: Path, text: str, sentence: str) -> None:

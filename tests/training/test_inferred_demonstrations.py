@@ -16,6 +16,7 @@ from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.errors import BootifolError
 from bootifol.replay.buffer import ReplayBuffer
+from bootifol.training import inferred_demonstrations
 from bootifol.training.budget import Budget, Counters
 from bootifol.training.cloning import (
     cloning_due,
@@ -29,7 +30,7 @@ from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.types import Arrays, Batch, Episode, FrameBatch, Frames, Metrics, Video, VideoSource
 
 SIZE, STEPS, MOVES = 32, 12, 4
-CONFIG = DemonstrationConfig(fraction=0.5, batch_size=32)
+CONFIG = DemonstrationConfig(fraction=0.5)
 
 
 def sliding_square(seed: int, actions: np.ndarray) -> Frames:
@@ -121,14 +122,14 @@ def test_actions_and_rewards_of_the_videos_are_inferred() -> None:
     np.testing.assert_array_equal(everything.reward.numpy().reshape(6, STEPS)[:, 0], np.arange(6))
 
 
-@pytest.mark.parametrize(("moving_fraction", "expected"), [(0.75, 0.75), (1.0, 1.0), (0.0, 0.0)])
-def test_transitions_are_drawn_by_movement(moving_fraction: float, expected: float) -> None:
-    demonstrations = make_demonstrations(
-        replace(CONFIG, moving_fraction=moving_fraction, history_dropout=0.0)
-    )
+@pytest.mark.parametrize("fraction", [0.75, 1.0, 0.0])
+def test_transitions_are_drawn_by_movement(fraction: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inferred_demonstrations, "MOVING_FRACTION", fraction)
+    monkeypatch.setattr(inferred_demonstrations, "HISTORY_DROPOUT", 0.0)
+    demonstrations = make_demonstrations(CONFIG)
     batch = demonstrations.sample(64, np.random.default_rng(0))
     moves = (batch.next_observation[:, 3:] != batch.observation[:, 3:]).flatten(1).any(dim=1)
-    assert float(moves.float().mean()) == expected
+    assert float(moves.float().mean()) == fraction
 
 
 def test_videos_without_movement_can_be_drawn_from() -> None:
@@ -183,7 +184,7 @@ def test_inverse_dynamics_prefers_steps_of_the_policy(
     policy_steps: int, newest: int | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     demonstrations, replay = (
-        make_demonstrations(replace(CONFIG, batch_size=64, policy_fraction=0.5)),
+        make_demonstrations(CONFIG),
         agent_steps(),
     )
     drawn: list[np.ndarray] = []
@@ -195,11 +196,11 @@ def test_inverse_dynamics_prefers_steps_of_the_policy(
 
     monkeypatch.setattr(ReplayBuffer, "sample", watched)
     demonstrations.learn_inverse_dynamics(replay, policy_steps, np.random.default_rng(0), 1e-3)
-    assert drawn[0].shape == (64,)
+    assert drawn[0].shape == (128,)
     assert drawn[0].min() >= 0 and drawn[0].max() < len(replay)
     if newest is not None:
-        assert (drawn[0][32:] >= len(replay) - newest).all()
-    assert (drawn[0][:32] < len(replay) - 30).any()
+        assert (drawn[0][64:] >= len(replay) - newest).all()
+    assert (drawn[0][:64] < len(replay) - 30).any()
 
 
 def test_the_inverse_dynamics_sees_both_pictures_shifted_alike(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -280,7 +281,7 @@ def test_warm_up_actions_are_held(tmp_path: Path, demos: Path) -> None:
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("fraction", 1.0), ("moving_fraction", 1.1), ("history_dropout", -0.1), ("cloning_updates", -1)],
+    [("fraction", 1.0), ("cloning_updates", -1)],
 )
 def test_mistakes_are_sentences(field: str, value: float) -> None:
     with pytest.raises(BootifolError, match=field):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -160,10 +159,6 @@ def test_stored_rewards_are_those_of_their_episode(
         assert {stored[episode] for episode in changed} <= {100 * known_reward.version + n for n in changed}
         assert all(stored[episode] % 100 == episode for episode in stored)
         renewed |= changed
-
-        ring = run.parts.agent_videos.state()
-        episodes = map(number, json.loads(ring["names"].tobytes()))
-        assert ring["rewards"].tolist() == [stored[episode] for episode in episodes]
     assert len(renewed) > 4
     assert known_reward.compared_with == {"drawn_reach-expert"}
 

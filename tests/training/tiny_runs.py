@@ -66,7 +66,6 @@ WITH_DEMONSTRATIONS = replace(
         cloning_updates=4,
         phases=3,
         repeat_every=60,
-        batch_size=8,
     ),
 )
 """The same, starting as a clone of the expert videos."""
@@ -83,11 +82,10 @@ SEEING = replace(
         bootifol=replace(
             TINY.reward.bootifol,
             reward="frames",
-            frames=FrameConfig(videos_per_class=2, frames_per_class=8, width=4, hidden_dim=8),
+            frames=FrameConfig(videos_per_class=2, frames_per_class=8, width=4),
         ),
     ),
     agent=replace(WITH_DEMONSTRATIONS.agent, observations="states", critic_norm=True, ema_decay=0.9),
-    interactive=replace(TINY.interactive, relabel_every=2),
     evaluation=replace(TINY.evaluation, sight_episodes=1),
 )
 """The same with a reward from single frames and an agent that reads states."""

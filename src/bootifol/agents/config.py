@@ -3,17 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal
 
-from bootifol.errors import (
-    fields_of,
-    require_at_least,
-    require_below_one,
-    require_choices,
-    require_fraction,
-    require_positive,
-)
+from bootifol.settings import BelowOne, Count, CountOrZero, Flag, Fraction, Number, Positive, settings
 
 Precision = Literal["bf16", "fp32"]
 EncoderName = Literal["paper", "strided", "coarse"]
@@ -21,6 +13,7 @@ Observations = Literal["pictures", "encodings", "states"]
 
 
 @dataclass(frozen=True)
+@settings("agent")
 class DrQv2Config:
     """DrQ-v2; the defaults are those of its paper, with the replay of BootIfOL's release."""
 
@@ -35,67 +28,67 @@ class DrQv2Config:
     strided: the same with strides 2, 2, 1, 1. coarse: 8x8 stride 4, 4x4 stride 2, 3x3 (32, 64, 64 channels),
     the cheapest."""
 
-    feature_dim: int = 50
+    feature_dim: Count = 50
     """Width of the trunks between the encoder and the actor's and critic's heads."""
 
-    hidden_dim: int = 1024
+    hidden_dim: Count = 1024
     """Width of the two hidden layers of the actor and of each critic."""
 
-    critic_norm: bool = False
+    critic_norm: Flag = False
     """Beyond DrQ-v2: LayerNorm after the critics' hidden layers, which keeps Q in bounds where rewards move."""
 
-    batch_size: int = 256
+    batch_size: Count = 256
     """Transitions an update learns from."""
 
-    update_every: int = 2
+    update_every: Count = 2
     """Agent steps an update."""
 
-    n_step: int = 3
+    n_step: Count = 3
     """Rewards summed before bootstrapping."""
 
-    discount: float = 0.99
+    discount: Fraction = 0.99
     """Discount of future rewards an agent step."""
 
-    learning_rate: float = 1e-4
+    learning_rate: Positive = 1e-4
     """Of Adam, for encoder, critic and actor."""
 
-    tau: float = 0.01
+    tau: Fraction = 0.01
     """How far the target critic moves to the critic at each update (tau)."""
 
-    exploration_start: float = 1.0
+    exploration_start: Number = 1.0
     """Standard deviation of the action noise at the first agent step."""
 
-    exploration_end: float = 0.1
+    exploration_end: Number = 0.1
     """Standard deviation of the action noise once exploration_steps have passed."""
 
-    exploration_steps: int = 500_000
+    exploration_steps: CountOrZero = 500_000
     """Agent steps over which the noise falls linearly."""
 
-    noise_clip: float = 0.3
+    noise_clip: Number = 0.3
     """Largest noise on the actions that the losses evaluate; the actions taken are not so limited."""
 
-    warm_up_steps: int = 1920
+    warm_up_steps: CountOrZero = 1920
     """Agent steps of uniformly random actions before the first update; the Interactive Phase draws them."""
 
-    warm_up_hold: int = 1
+    warm_up_hold: Count = 1
     """Largest number of agent steps that a random action of the warm-up is repeated for, drawn anew each time. 1, as
     in the paper, never. Held actions reach speeds that trembling does not, and inverse dynamics needs to see them."""
 
-    replay_capacity: int = 100_000
+    replay_capacity: Count = 100_000
     """Frames that replay holds; an episode of T transitions takes T + 1."""
 
-    random_shift: int = 4
+    random_shift: CountOrZero = 4
     """Largest random shift of the pictures in pixels."""
 
-    saturation_weight: float = 0.0
+    saturation_weight: Number = 0.0
     """Beyond DrQ-v2: weight of `saturation_loss` beside the actor's; 0, as in its paper, leaves it out. Where tanh is
     saturated no gradient passes, and an actor that early estimates sent into a corner never comes back."""
 
-    cloning_weight: float = 0.0
+    cloning_weight: Number = 0.0
     """Beyond the paper: how strongly actor and encoder are pulled to the inferred actions of expert videos, relative
     to the mean of |Q| or 1, whichever is larger; 0, as in the paper, not at all. Needs `demonstrations`."""
 
-    ema_decay: float = 0.0
+    ema_decay: BelowOne = 0.0
     """Beyond DrQ-v2: without exploration the policy acts with running averages of encoder and actor, which keep this
     fraction of themselves at each update and so even out the noise of the last ones; 0, as in its paper, the newest.
     Until 1 / (1 - ema_decay) updates they are plain means, in which nothing is left of the initial parameters."""
@@ -103,23 +96,6 @@ class DrQv2Config:
     precision: Precision = "fp32"
     """Arithmetic of convolutions and matrix products, also of the inverse dynamics; parameters, losses and Q values are
     always float32."""
-
-    def __post_init__(self) -> None:
-        of_self = partial(fields_of, "agent", self)
-        require_choices("agent", self)
-        widths = ("feature_dim", "hidden_dim", "batch_size", "replay_capacity")
-        require_at_least(1, **of_self(*widths, "update_every", "warm_up_hold", "n_step"))
-        exploration = (
-            "exploration_start",
-            "exploration_end",
-            "exploration_steps",
-            "noise_clip",
-            "warm_up_steps",
-        )
-        require_at_least(0, **of_self(*exploration, "saturation_weight", "cloning_weight", "random_shift"))
-        require_positive(**of_self("learning_rate"))
-        require_fraction(**of_self("discount", "tau"))
-        require_below_one(**of_self("ema_decay"))
 
     def exploration(self, agent_steps: float) -> float:
         """Standard deviation of the noise after so many agent steps."""

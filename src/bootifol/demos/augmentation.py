@@ -14,39 +14,30 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bootifol.errors import BootifolError, require_at_least
+from bootifol.settings import settings
 from bootifol.types import FrameBatch, Video, VideoSource
+
+BRIGHTNESS = 12.0
+"""Levels of 255 added or taken away, at most; half as many more for each color by itself."""
+
+CONTRAST = 0.1
+"""Fraction by which differences grow or shrink, at most; half as much more for each color by itself."""
+
+NOISE = 3.0
+"""Greatest standard deviation of the noise of every pixel, in levels of 255."""
+
+BLUR = 0.5
+"""Fraction of videos that are blurred, by a binomial filter of 3x3 pixels."""
 
 
 @dataclass(frozen=True)
+@settings("augmentation")
 class AugmentationConfig:
-    """How much looks vary. Every video drawn has its own, and keeps them from its first frame to its last."""
+    """When looks vary. Every video drawn has its own, and keeps them from its first frame to its last."""
 
     when: Literal["never", "imported", "always"] = "never"
     """`imported`: where the expert videos come from files. The paper's are recorded and never vary. A pretrained
     backbone, whose features are computed once, never sees them vary."""
-
-    brightness: float = 12.0
-    """Levels of 255 added or taken away, at most; half as many more for each color by itself."""
-
-    contrast: float = 0.1
-    """Fraction by which differences grow or shrink, at most; half as much more for each color by itself."""
-
-    noise: float = 3.0
-    """Greatest standard deviation of the noise of every pixel, in levels of 255."""
-
-    blur: float = 0.5
-    """Fraction of videos that are blurred, by a binomial filter of 3x3 pixels."""
-
-    def __post_init__(self) -> None:
-        require_at_least(
-            0, brightness=self.brightness, contrast=self.contrast, noise=self.noise, blur=self.blur
-        )
-        if self.contrast > 0.5 or self.blur > 1:
-            raise BootifolError(
-                "augmentation takes a contrast of at most 0.5 and a blur, which is a fraction of videos, of at most 1, "
-                f"not {self.contrast} and {self.blur}"
-            )
 
     def applies(self, imported: bool) -> bool:
         """Whether looks vary in a run whose expert videos were imported, or recorded."""
@@ -58,12 +49,10 @@ class AugmentedVideos:
 
     Args:
         videos: where samples come from.
-        config: how much they vary.
     """
 
-    def __init__(self, videos: VideoSource, config: AugmentationConfig) -> None:
+    def __init__(self, videos: VideoSource) -> None:
         self.videos = videos
-        self.config = config
 
     def __len__(self) -> int:
         return len(self.videos)
@@ -73,31 +62,30 @@ class AugmentedVideos:
 
     def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
         """As the source's, uint8 `[count, T + 1, H, W, 3]`, each video with looks of its own."""
-        return augment(self.videos.sample(count, rng), self.config, rng)
+        return augment(self.videos.sample(count, rng), rng)
 
 
-def augmented(videos: VideoSource, config: AugmentationConfig | None) -> VideoSource:
-    """The source with varying looks, or itself without a configuration."""
-    return videos if config is None else AugmentedVideos(videos, config)
+def augmented(videos: VideoSource, varied: bool) -> VideoSource:
+    """The source with varying looks, where they are `varied`, or itself."""
+    return AugmentedVideos(videos) if varied else videos
 
 
-def augment(videos: FrameBatch, config: AugmentationConfig, rng: np.random.Generator) -> FrameBatch:
+def augment(videos: FrameBatch, rng: np.random.Generator) -> FrameBatch:
     """Videos `[B, T + 1, H, W, 3]`, uint8, each in other looks; the ones given stay as they are."""
     varied = np.empty_like(videos)
     # Drawing noise takes longer than all else: one draw serves all videos, each from another place of it.
-    noise = rng.standard_normal(videos[0].shape, dtype=np.float32) if config.noise else None
+    noise = rng.standard_normal(videos[0].shape, dtype=np.float32)
     for video, out in zip(videos, varied, strict=True):
         pixels = video.astype(np.float32)
-        if rng.random() < config.blur:
+        if rng.random() < BLUR:
             pixels = _blurred(pixels)
         # Whole lines of pixels at a time: numpy is slow over an axis of three.
         lines = pixels.reshape(-1, 3 * pixels.shape[2])
-        lines *= np.tile(1 + _around_zero(config.contrast, rng), pixels.shape[2])
-        lines += np.tile(_around_zero(config.brightness, rng), pixels.shape[2])
-        if noise is not None:
-            moved = np.roll(noise.reshape(-1), int(rng.integers(noise.size))).reshape(noise.shape)
-            moved *= np.float32(rng.uniform(0, config.noise))
-            pixels += moved
+        lines *= np.tile(1 + _around_zero(CONTRAST, rng), pixels.shape[2])
+        lines += np.tile(_around_zero(BRIGHTNESS, rng), pixels.shape[2])
+        moved = np.roll(noise.reshape(-1), int(rng.integers(noise.size))).reshape(noise.shape)
+        moved *= np.float32(rng.uniform(0, NOISE))
+        pixels += moved
         np.clip(np.rint(pixels, out=pixels), 0, 255, out=pixels)
         out[...] = pixels
     return varied

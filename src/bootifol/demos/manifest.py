@@ -7,10 +7,13 @@ import re
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from bootifol.errors import BootifolError, shortened
+from pydantic import Field, Strict
+
+from bootifol.errors import LARGEST_SEED, BootifolError, shortened
 from bootifol.files import read_json, write_json
+from bootifol.settings import AtLeastTwo, Count, CountOrZero, Flag, Positive, as_settings
 
 FORMAT = 1
 MANIFEST_NAME = "manifest.json"
@@ -26,14 +29,25 @@ _PACKAGES = (
     "av",
 )
 
+_MAY_LACK = (
+    "task",
+    "seed",
+    "agent_size",
+    "render_profile",
+    "action_repeat",
+    "frames_per_second",
+    "conversion",
+)
+"""Fields that a manifest need not have; they are None then."""
+
 
 @dataclass(frozen=True)
 class Shard:
     """One file of videos, `shard-00000.npy`: uint8 `[videos, T + 1, H, W, 3]`."""
 
     file: str
-    videos: int
-    bytes: int
+    videos: Count
+    bytes: Annotated[int, Strict(), Field(ge=1)]
     """Size of the whole file, header included."""
     sha256: str
     """Of the whole file, header included."""
@@ -48,7 +62,7 @@ class VideoEntry:
     """Where it comes from: `{"behavior", "seed"}` when recorded, `{"file", "first_frame"}` when imported, with
     `"episode"` and `"camera"` when the file is a LeRobot dataset, `"address"` when it was fetched from a hub, and
     `"notes"` where there was a choice how to read it."""
-    length: int
+    length: Count
     """Frames that were seen. A shorter video stands still on its last frame until the set's length."""
     sha256: str
     """Of its pixels `[T + 1, H, W, 3]` in memory order."""
@@ -70,26 +84,26 @@ class Manifest:
 
     name: str
     """The set's name, from which its videos are named: `<name>-000123`."""
-    complete: bool
+    complete: Flag
     """False while a recording is under way or was interrupted."""
     task: str | None
     """Name in the catalogue of tasks; None for imported videos."""
     behavior: str
     """Who performs: expert, half_good, random, still."""
-    seed: int | None
+    seed: Annotated[int, Strict(), Field(ge=0, le=LARGEST_SEED)] | None
     """The seed all videos' seeds derive from; None for imported videos."""
-    episodes: int
+    episodes: Count
     """Videos the complete set has."""
-    frames: int
+    frames: AtLeastTwo
     """Frames of a video, T + 1."""
-    video_size: int
+    video_size: Count
     """Height and width in pixels of the pictures in this set."""
-    agent_size: int | None
+    agent_size: CountOrZero | None
     """The agent's pictures at recording time. One picture is rendered at the larger of the two sizes and
     resized for the other, so this, too, shows in the pixels."""
     render_profile: str | None
-    action_repeat: int | None
-    frames_per_second: float | None
+    action_repeat: CountOrZero | None
+    frames_per_second: Positive | None
     """Of these videos as time passes in the scene; None when unknown (pictures in a folder)."""
     conversion: dict[str, Any] | None
     """For imported videos, how the files became this set; None when recorded."""
@@ -133,41 +147,10 @@ def read_manifest(directory: Path) -> Manifest:
             f"{path} has format {shortened(value.get('format'))} and this bootifol reads format {FORMAT}: "
             "record the set again, or use the version that wrote it"
         )
-    fields = _Fields(path, value)
-    manifest = Manifest(
-        name=fields.text("name"),
-        complete=fields.boolean("complete"),
-        task=fields.text("task") if value.get("task") is not None else None,
-        behavior=fields.text("behavior"),
-        seed=fields.optional_integer("seed"),
-        episodes=fields.integer("episodes", least=1),
-        frames=fields.integer("frames", least=2),
-        video_size=fields.integer("video_size", least=1),
-        agent_size=fields.optional_integer("agent_size"),
-        render_profile=fields.text("render_profile") if value.get("render_profile") is not None else None,
-        action_repeat=fields.optional_integer("action_repeat"),
-        frames_per_second=fields.optional_number("frames_per_second"),
-        conversion=fields.mapping("conversion") if value.get("conversion") is not None else None,
-        versions=fields.mapping("versions"),
-        shards=tuple(
-            Shard(
-                file=entry.text("file"),
-                videos=entry.integer("videos", least=1),
-                bytes=entry.integer("bytes", least=1),
-                sha256=entry.text("sha256"),
-            )
-            for entry in fields.entries("shards")
-        ),
-        videos=tuple(
-            VideoEntry(
-                name=entry.text("name"),
-                source=entry.mapping("source"),
-                length=entry.integer("length", least=1),
-                sha256=entry.text("sha256"),
-            )
-            for entry in fields.entries("videos")
-        ),
-    )
+    try:
+        manifest = as_settings(Manifest, dict.fromkeys(_MAY_LACK) | value)
+    except BootifolError as error:
+        raise BootifolError(f"{path} is damaged: {error}; record or import the set again") from error
     _check_consistent(path, manifest)
     return manifest
 
@@ -225,55 +208,3 @@ def _check_consistent(path: Path, manifest: Manifest) -> None:
             raise BootifolError(f"{path} names a file that is no shard of its own: {shortened(shard.file)}")
     if len({video.name for video in manifest.videos}) != len(manifest.videos):
         raise BootifolError(f"{path} gives two videos the same name; record or import the set again")
-
-
-class _Fields:
-    """Typed access to one JSON object of a manifest, with an error that names the file and the field."""
-
-    def __init__(self, path: Path, value: dict[str, Any]) -> None:
-        self.path = path
-        self.value = value
-
-    def text(self, key: str) -> str:
-        if not isinstance(found := self.value.get(key), str):
-            raise self._wrong(key, "a text")
-        return found
-
-    def boolean(self, key: str) -> bool:
-        if not isinstance(found := self.value.get(key), bool):
-            raise self._wrong(key, "true or false")
-        return found
-
-    def integer(self, key: str, least: int = 0) -> int:
-        found = self.value.get(key)
-        if not isinstance(found, int) or isinstance(found, bool) or not least <= found < 2**63:
-            raise self._wrong(key, f"a whole number of at least {least}")
-        return found
-
-    def optional_integer(self, key: str) -> int | None:
-        return self.integer(key) if self.value.get(key) is not None else None
-
-    def optional_number(self, key: str) -> float | None:
-        found = self.value.get(key)
-        if found is None:
-            return None
-        if not isinstance(found, int | float) or isinstance(found, bool) or not 0 < found < 1e9:
-            raise self._wrong(key, "a positive number")
-        return float(found)
-
-    def mapping(self, key: str) -> dict[str, Any]:
-        if not isinstance(found := self.value.get(key), dict):
-            raise self._wrong(key, "an object")
-        return found
-
-    def entries(self, key: str) -> list[_Fields]:
-        found = self.value.get(key)
-        if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
-            raise self._wrong(key, "a list of objects")
-        return [_Fields(self.path, entry) for entry in found]
-
-    def _wrong(self, key: str, expected: str) -> BootifolError:
-        return BootifolError(
-            f"{self.path} is damaged: {key!r} should be {expected} and is {shortened(self.value.get(key))}; "
-            "record or import the set again"
-        )

@@ -4,44 +4,36 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Literal, TypeGuard
+from typing import Annotated, Literal, TypeGuard
 
 import numpy as np
 from PIL import Image
+from pydantic import Field, Strict
 
-from bootifol.errors import BootifolError
+from bootifol.settings import Count, settings
 from bootifol.types import Frame, Observation
 
+Pixels = Annotated[int, Strict(), Field(ge=8, le=1024)]
 RenderProfile = Literal["fast", "balanced", "full"]
 
 
 @dataclass(frozen=True)
+@settings("pictures")
 class PictureConfig:
     """How the agent and the reward model see the environment; one picture an agent step serves both."""
 
-    agent_size: int = 84
+    agent_size: Pixels = 84
     """Height and width of what the agent sees, in pixels."""
 
-    video_size: int = 64
+    video_size: Pixels = 64
     """Height and width of what the reward model sees, in pixels."""
 
-    stack: int = 3
+    stack: Count = 3
     """Newest frames in one observation of the agent."""
 
     profile: RenderProfile = "fast"
     """fast: no shadows, reflections or sky, about a tenth of the time of full. balanced: a small shadow map, no
     anti-aliasing. full: the simulator's own quality. Videos and environment must agree."""
-
-    def __post_init__(self) -> None:
-        for name in ("agent_size", "video_size"):
-            if not 8 <= getattr(self, name) <= 1024:
-                raise BootifolError(
-                    f"pictures: {name} must lie in 8 … 1024 pixels, not {getattr(self, name)}"
-                )
-        if self.stack < 1:
-            raise BootifolError(f"pictures: stack must be at least 1 frame, not {self.stack}")
-        if self.profile not in ("fast", "balanced", "full"):
-            raise BootifolError(f"pictures: profile must be fast, balanced or full, not '{self.profile}'")
 
     @property
     def picture_size(self) -> int:

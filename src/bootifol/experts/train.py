@@ -14,20 +14,25 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import torch
+from pydantic import Field, Strict
 from torch import Tensor, nn
 
-from bootifol.errors import MOST_THREADS, BootifolError, require_at_least, require_at_most
+from bootifol.errors import BootifolError
 from bootifol.experts.policy import Layer, StatePolicy
 from bootifol.experts.states import StateEnvironment
 from bootifol.files import last_whole, read_arrays, read_json, write_arrays, write_json, written_aside
 from bootifol.locks import one_writer
 from bootifol.progress import progress
+from bootifol.settings import Count, Fraction, Number, Positive, Threads, settings
 from bootifol.tasks import task_named
 from bootifol.types import Arrays
+
+Seed = Annotated[int, Strict(), Field(ge=0, le=2**32 - 1)]
+"""What stable-baselines3 takes."""
 
 Algorithm = Literal["SAC", "TQC", "CrossQ"]
 
@@ -41,6 +46,7 @@ COLUMNS = ("agent_steps", "seconds", "mean_return", "lowest_return")
 
 
 @dataclass(frozen=True)
+@settings("experts")
 class ExpertConfig:
     """How an expert is trained; what is not here is the library's default."""
 
@@ -48,45 +54,28 @@ class ExpertConfig:
     algorithm: Algorithm = "SAC"
     hidden_dims: tuple[int, ...] = (256, 256)
     """Widths of the hidden layers, of actor and critics."""
-    agent_steps: int = 500_000
-    seed: int = 1
-    discount: float = 0.99
-    learning_rate: float = 3e-4
-    agent_steps_per_update: int = 1
+    agent_steps: Count = 500_000
+    seed: Seed = 1
+    discount: Fraction = 0.99
+    learning_rate: Positive = 3e-4
+    agent_steps_per_update: Count = 1
     """Agent steps for each update of actor and critics; an update takes many times as long as a step."""
-    n_step: int = 1
+    n_step: Count = 1
     """Agent steps whose rewards are summed before critics estimate the rest; rare rewards spread faster with 3."""
-    episode_steps: int | None = None
+    episode_steps: Count | None = None
     """Agent steps of a training episode; the task's evaluation length by default. Shorter ones show more starts, which
     is what rare rewards need; what would come later is estimated by the critics."""
     target_entropy: float | None = None
     """Entropy in nats that the noise of actions is steered to; minus the number of action dimensions by default. With
     less of it the mean action, which is what is kept, can do what noise would ruin."""
-    shaping: float = 0.0
+    shaping: Number = 0.0
     """Weight of a potential in the reward that is learned from, not in the returns of evaluations: in hopper_stand the
     height of the torso, without which no reward says how to rise."""
-    evaluation_every: int = 10_000
+    evaluation_every: Count = 10_000
     """Agent steps between two evaluations; each also writes a checkpoint."""
-    evaluation_episodes: int = 20
+    evaluation_episodes: Count = 20
     """From starts that are the same every time, and many enough that the best evaluation is not the luckiest."""
-    threads: int = 1
-
-    def __post_init__(self) -> None:
-        counts = (
-            "agent_steps",
-            "agent_steps_per_update",
-            "n_step",
-            "evaluation_every",
-            "evaluation_episodes",
-            "threads",
-        )
-        require_at_least(1, **{f"experts {name}": getattr(self, name) for name in counts})
-        require_at_most(10**9, **{f"experts {name}": getattr(self, name) for name in counts})
-        require_at_most(MOST_THREADS, threads=self.threads)
-        require_at_least(0, seed=self.seed)
-        require_at_most(2**32 - 1, seed=self.seed)  # what stable-baselines3 takes
-        if self.episode_steps is not None:
-            require_at_least(1, **{"experts episode_steps": self.episode_steps})
+    threads: Threads = 1
 
 
 def train_expert(config: ExpertConfig, out: Path, start_from: Path | None = None) -> StatePolicy:

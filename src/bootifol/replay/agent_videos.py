@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bootifol.demos.demo_set import draw
 from bootifol.errors import BootifolError
@@ -22,8 +20,7 @@ class AgentVideos:
     Where the reward model reads features, these are kept and the pictures are not: its videos then have pictures of
     0x0 pixels.
 
-    The environment's rewards of a video are not kept: nothing that learns from these videos may read them. Its learned
-    reward is, where only failures are drawn.
+    The environment's rewards of a video are not kept: nothing that learns from these videos may read them.
     """
 
     def __init__(
@@ -33,7 +30,6 @@ class AgentVideos:
         size: int,
         feature_size: int = 0,
         feature_bytes: int = 4,
-        failures_fraction: float = 1.0,
     ) -> None:
         """Reserves the memory (the system hands it out as episodes arrive).
 
@@ -43,7 +39,6 @@ class AgentVideos:
             size: height and width of a frame in pixels.
             feature_size: features of a frame, kept instead of its pixels; 0 keeps the pixels.
             feature_bytes: 4 for float32 features, 1 for int8 states.
-            failures_fraction: fraction of the videos, those of the lowest learned reward, that `sample` draws from.
         """
         if capacity < 1:
             raise BootifolError(f"the agent's videos need room for at least 1 episode, not {capacity}")
@@ -53,8 +48,6 @@ class AgentVideos:
         self._features: FeatureBatch = (
             np.zeros(shape, np.float32) if feature_bytes == 4 else np.zeros(shape, np.int8)
         )
-        self._rewards = np.zeros(capacity, np.float32)
-        self._failures_fraction = failures_fraction
         self._names: list[str] = []
         self._next = 0
 
@@ -65,12 +58,8 @@ class AgentVideos:
         """Memory of a full ring, in bytes."""
         return capacity * frames * (feature_bytes * feature_size or size * size * 3)
 
-    def add(self, video: Video, reward: float = 0.0) -> None:
+    def add(self, video: Video) -> None:
         """Keeps a video, in the place of the oldest one when full.
-
-        Args:
-            video: of an episode.
-            reward: the learned one, a step in the mean.
 
         Raises:
             BootifolError: the video is longer than the ring's episodes, or its pictures or features have another size.
@@ -86,16 +75,11 @@ class AgentVideos:
         slot[len(frames) :] = frames[-1]
         if not self._keeps_pixels:
             self._add_features(video)
-        self._rewards[self._next] = reward
         if len(self._names) < len(self._frames):
             self._names.append(video.name)
         else:
             self._names[self._next] = video.name
         self._next = (self._next + 1) % len(self._frames)
-
-    def reward_anew(self, index: int, reward: float) -> None:
-        """Replaces the learned reward of the video in a slot, as `add` takes it."""
-        self._rewards[index] = reward
 
     def __len__(self) -> int:
         return len(self._names)
@@ -123,19 +107,10 @@ class AgentVideos:
         return (self._next - 1 - age) % len(self._frames)
 
     def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
-        return self._frames[self._drawn(count, rng)]
+        return self._frames[draw(len(self), count, rng)]
 
     def sample_features(self, count: int, rng: np.random.Generator) -> FeatureBatch:
-        return self._features[self._drawn(count, rng)]
-
-    def _drawn(self, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
-        """Slots to sample: of any video, or of the failures, which are never fewer than are asked for if so many are
-        kept."""
-        failures = max(math.ceil(self._failures_fraction * len(self)), min(count, len(self)))
-        slots = np.arange(len(self))
-        if failures < len(self):
-            slots = np.argsort(self._rewards[: len(self)], kind="stable")
-        return slots[draw(failures, count, rng)]
+        return self._features[draw(len(self), count, rng)]
 
     def state(self) -> Arrays:
         """Frames or features, names and the next slot; the former are a view, to be written before the next `add`."""
@@ -143,7 +118,6 @@ class AgentVideos:
             self._kept_name: self._kept[: len(self)],
             "names": np.frombuffer(json.dumps(self._names).encode(), np.uint8),
             "next": np.array([self._next], np.int64),
-            "rewards": self._rewards[: len(self)].copy(),
         }
 
     def load_state(self, arrays: Arrays) -> None:
@@ -159,7 +133,6 @@ class AgentVideos:
                 f"{list(kept.shape)}: resume with the configuration of the run that saved them"
             )
         kept[: len(saved)] = saved
-        self._rewards[: len(saved)] = arrays["rewards"]
         self._names = json.loads(arrays["names"].tobytes())
         self._next = int(arrays["next"][0])
 

@@ -13,6 +13,7 @@ from bootifol.rewards.gaifo import config as gaifo
 from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.rewards.virl import config as virl
 from bootifol.rewards.virl.config import VirlConfig
+from bootifol.settings import settings
 
 NAMES = {
     "bootifol": bootifol.NAME,
@@ -37,6 +38,7 @@ CAPTIONS = {
 
 
 @dataclass(frozen=True)
+@settings("reward")
 class RewardConfig:
     """One section a method, of its name; only the chosen method's is read."""
 

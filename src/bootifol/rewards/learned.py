@@ -26,11 +26,6 @@ class LearnedConfig(Protocol):
         """Of Adam."""
         ...
 
-    @property
-    def precision(self) -> str:
-        """fp32, or bf16 to compute in bfloat16 where a method allows it."""
-        ...
-
 
 NORMALIZATION_MOMENTUM = 0.1
 """How far running normalization statistics move to those of a gradient step, PyTorch's default."""
@@ -148,4 +143,6 @@ class LearnedRewardModel(Generic[Config, Networks]):
             self.networks.train()
 
     def _autocast(self) -> torch.autocast:
-        return torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.precision == "bf16")
+        """bfloat16 where a method's configuration says so."""
+        bf16 = getattr(self.config, "precision", "fp32") == "bf16"
+        return torch.autocast(self.device.type, torch.bfloat16, enabled=bf16)

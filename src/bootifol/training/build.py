@@ -120,7 +120,7 @@ def build_parts(run: RunConfig, task: Task, console: Console, demos: Demos | Non
     console.print(f"memory when full: {', '.join(memory)}")
     demonstrations = None
     replay = build_replay(run, reward_model, capacity, action_dim)
-    agent_videos = AgentVideos(*ring, failures_fraction=config.interactive.failures_fraction)
+    agent_videos = AgentVideos(*ring)
     if demonstrated:
         demonstrations = Demonstrations(
             config.demonstrations,

@@ -21,6 +21,12 @@ from bootifol.types import StepMetrics
 INVERSE_DYNAMICS_TIME = 1 / 3
 """Fraction of a Cloning Phase's time, where it is limited, by which the inverse dynamics has learned."""
 
+INVERSE_DYNAMICS_LEARNING_RATE = 5e-4
+"""Of Adam at its highest: in each phase it rises for a twentieth of the gradient steps and falls to 0."""
+
+CLONING_LEARNING_RATE = 1e-3
+"""Likewise."""
+
 
 def cloning_phase(
     agent: DrQv2,
@@ -64,7 +70,7 @@ def cloning_phase(
         if step < inferring:
             # The inverse dynamics learns from the agent's own steps.
             part_passed = min(time_passed / INVERSE_DYNAMICS_TIME, 1.0)
-            rate = one_cycle(step, inferring, part_passed) * config.inverse_dynamics_learning_rate
+            rate = one_cycle(step, inferring, part_passed) * INVERSE_DYNAMICS_LEARNING_RATE
             policy_steps = counters.agent_steps - agent.config.warm_up_steps
             metrics = demonstrations.learn_inverse_dynamics(agent_replay, policy_steps, rng, rate)
             last = inferring
@@ -76,7 +82,7 @@ def cloning_phase(
             # The policy learns to do what was inferred.
             part_passed = max((time_passed - INVERSE_DYNAMICS_TIME) / (1 - INVERSE_DYNAMICS_TIME), 0.0)
             rate = one_cycle(step - cloning, config.cloning_updates, part_passed)
-            rate *= config.cloning_learning_rate
+            rate *= CLONING_LEARNING_RATE
             metrics = agent.clone(demonstrations.sample(agent.config.batch_size, rng), rate)
             last = total
         counters.cloning_steps = earlier + (step + 1 if part_passed < 1 else last)

@@ -14,23 +14,16 @@ import yaml
 
 from bootifol.errors import BootifolError, shortened
 from bootifol.files import parsed_json, require_file
+from bootifol.settings import CountOrZero, settings
 from bootifol.training.budget import parse_duration
 from bootifol.training.config import TrainingConfig
 from bootifol.training.overrides import field_kinds, nearest, overridden
-from bootifol.training.run_config import FORMAT, fits, todays_fields
+from bootifol.training.run_config import FORMAT, todays_fields
 
 LARGEST = 1_000_000
 """Bytes of a file above which it is no configuration."""
 
-_KINDS: dict[str, Any] = {
-    "task": str | None,
-    "method": str,
-    "preset": str,
-    "seed": int,
-    "time_budget": float | str | None,
-    "demos": str | None,
-    "out": str | None,
-}
+_BESIDE = ("task", "method", "preset", "seed", "time_budget", "demos", "out")
 """What a file may say beside the fields of `TrainingConfig`."""
 
 _TOLD = ("format", "command", "versions", "videos", "resumed", "checksum")
@@ -38,13 +31,14 @@ _TOLD = ("format", "command", "versions", "videos", "resumed", "checksum")
 
 
 @dataclass(frozen=True)
+@settings("")
 class ConfigFile:
     """What a file says; None where it says nothing."""
 
     task: str | None = None
     method: str | None = None
     preset: str | None = None
-    seed: int | None = None
+    seed: CountOrZero | None = None
     time_budget: str | None = None
     """As it is typed, such as 90m."""
     demos: str | None = None
@@ -82,25 +76,26 @@ def read_config_file(path: Path) -> ConfigFile:
     inner = data.pop("config", None) or {}
     if not isinstance(inner, dict):
         raise BootifolError(f"{path}: config holds the fields of a run and cannot be {shortened(inner)}")
-    known = [*_KINDS, *field_kinds()]
+    known = [*_BESIDE, *field_kinds()]
     fields = dict(todays_fields(inner, path))
     said: dict[str, Any] = {}
     for name, value in todays_fields(data, path).items():
         if name in _TOLD:
             continue
-        if name not in _KINDS:
+        if name not in _BESIDE:
             if str(name).partition(".")[0] not in field_kinds():
                 raise BootifolError(f"{path}: there is no field {shortened(name)}{nearest(str(name), known)}")
             if name in fields:
                 raise BootifolError(f"{path}: {name} stands both in config and beside it: leave one out")
             fields[name] = value
-        elif not fits(value, _KINDS[name]):
-            raise BootifolError(f"{path}: {name} cannot be {shortened(value)}")
         elif value is not None:
             said[name] = value
     if "time_budget" in said:
         said["time_budget"] = _duration(said["time_budget"], path)
-    return ConfigFile(**said, fields=fields, of_a_run=of_a_run)
+    try:
+        return ConfigFile(**said, fields=fields, of_a_run=of_a_run)
+    except BootifolError as error:
+        raise BootifolError(f"{path}: {error}") from error
 
 
 def config_text(
@@ -122,8 +117,10 @@ def config_text(
     return text
 
 
-def _duration(value: float | str, path: Path) -> str:
+def _duration(value: object, path: Path) -> str:
     """A time budget as it is typed; a run's `config.json` has seconds."""
+    if not isinstance(value, str | int | float) or isinstance(value, bool):
+        raise BootifolError(f"{path}: time_budget cannot be {shortened(value)}")
     text = value if isinstance(value, str) else f"{value!r}".removesuffix(".0") + "s"
     try:
         parse_duration(text)

@@ -31,6 +31,19 @@ from bootifol.types import Arrays, Batch, Episode, Frames, FrameStates, StepMetr
 MOVING = 0.1
 """A picture moves where it changes by more than this fraction of its video's largest change."""
 
+MOVING_FRACTION = 0.8
+"""Fraction of the transitions drawn from expert videos in which the picture moves."""
+
+HISTORY_DROPOUT = 0.8
+"""Fraction of the observations drawn from expert videos whose stack repeats its newest frame."""
+
+BATCH_SIZE = 128
+"""Transitions of a gradient step of the inverse dynamics."""
+
+POLICY_FRACTION = 0.5
+"""Fraction of these from steps after the warm-up, as soon as there are any: the policy moves more like the expert than
+random actions do. The rest comes from all steps."""
+
 
 class Demonstrations:
     """Expert videos with inferred actions, as a second replay beside the agent's.
@@ -96,9 +109,9 @@ class Demonstrations:
             rng: draws the batch.
             learning_rate: of Adam, for this step.
         """
-        size, stored = self.config.batch_size, len(agent_replay)
+        size, stored = BATCH_SIZE, len(agent_replay)
         newest = min(policy_steps, stored)
-        of_policy = round(self.config.policy_fraction * size) if newest > 0 else 0
+        of_policy = round(POLICY_FRACTION * size) if newest > 0 else 0
         drawn = np.concatenate(
             [
                 rng.integers(0, stored, size - of_policy),
@@ -118,14 +131,12 @@ class Demonstrations:
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
         """Transitions of the expert videos, most of them where the picture moves."""
-        moving = round(batch_size * self.config.moving_fraction)
+        moving = round(batch_size * MOVING_FRACTION)
         moving = batch_size if not len(self._still) else moving if len(self._moving) else 0
         drawn = np.concatenate(
             [rng.choice(self._moving, moving), rng.choice(self._still, batch_size - moving)]
         )
-        return self.replay.sample(
-            batch_size, rng, transitions=drawn, history_dropout=self.config.history_dropout
-        )
+        return self.replay.sample(batch_size, rng, transitions=drawn, history_dropout=HISTORY_DROPOUT)
 
     def mixed(self, agent_replay: ReplayBuffer, batch_size: int, rng: np.random.Generator) -> Batch:
         """A batch of which `fraction` comes from the expert videos."""

@@ -25,6 +25,10 @@ from bootifol.training.config import InteractiveConfig
 from bootifol.training.interruption import Interruption
 from bootifol.types import Action, Arrays, Batch, Observation, StepMetrics
 
+RELABEL_EVERY = 100
+"""Where replay keeps states: updates of the reward after which every stored step is rewarded anew, which takes a
+fraction of a second."""
+
 
 @dataclass
 class EpisodeInProgress:
@@ -64,15 +68,13 @@ class InteractivePhase:
         self.environment: gymnasium.Env[Any, Any] = parts.environment
         self.expert = parts.demos.expert
         self.agent_videos = parts.agent_videos
-        self.shown_agent_videos = augmented(parts.agent_videos, parts.demos.augmentation)
+        self.shown_agent_videos = augmented(parts.agent_videos, parts.demos.augmented)
         """The same as the reward learns from them, in looks that vary like the expert's."""
         self.replay = parts.replay
         self.reward_model = parts.reward_model
         # Videos from files: the head would learn to tell their compression from the agent's clean pictures, and its
         # eyes, which saw them in many looks, rest already.
-        self.reward_rests = parts.demos.augmentation is not None and isinstance(
-            parts.reward_model, SeesFrames
-        )
+        self.reward_rests = parts.demos.augmented and isinstance(parts.reward_model, SeesFrames)
         self.featurizer = parts.featurizer
         self.agent = parts.agent
         self.demonstrations = parts.demonstrations
@@ -157,7 +159,7 @@ class InteractivePhase:
         rewards = self.reward_model.label(episode.video, references)
         mean_reward = float(rewards.mean())
         self.replay.add(episode, rewards)
-        self.agent_videos.add(episode.video, mean_reward)
+        self.agent_videos.add(episode.video)
         counters.episodes += 1
         counters.interactive_seconds += self._watch.lap()
         return [*metrics, {"episode/learned_reward": mean_reward}]
@@ -224,7 +226,7 @@ class InteractivePhase:
         counters.reward_updates += 1
         # Beyond the paper: stored rewards follow the reward as it learns.
         if isinstance(model, SeesFrames) and self.replay.keeps_states:
-            if counters.reward_updates % self.config.relabel_every == 0:
+            if counters.reward_updates % RELABEL_EVERY == 0:
                 self.replay.relabel_all(model.score)
         else:
             for _ in range(self.config.relabel_episodes):
@@ -242,7 +244,6 @@ class InteractivePhase:
         # An episode that ended early stands still in the ring up to the full length; no reward looks ahead at that.
         rewards = rewards[: self.replay.agent_steps_of(episode_id)]
         self.replay.relabel(episode_id, rewards)
-        self.agent_videos.reward_anew(slot, float(rewards.mean()))
 
     def state(self) -> Arrays:
         """What goes on with the episode in progress; only where there is one."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bootifol.demos.augmentation import AugmentationConfig, augmented
+from bootifol.demos.augmentation import augmented
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.features import FeaturizedVideos, without_pixels
 from bootifol.demos.fit import differences
@@ -34,8 +34,8 @@ class Demos:
     """Videos of a random policy, the other class of the Alignment Phase."""
     held_out: dict[str, list[Video]] = field(default_factory=dict)
     """Videos by kind that the reward never learns from, to see whether it ranks them right."""
-    augmentation: AugmentationConfig | None = None
-    """How samples of `expert` and `random` vary in looks, and the agent's videos with them; None where none do."""
+    augmented: bool = False
+    """Whether samples of `expert` and `random` vary in looks; the agent's videos then do, too."""
     verification: Verification = field(default_factory=Verification)
     """Of the sets that were too large to be verified on opening."""
 
@@ -94,16 +94,15 @@ def open_demos(run: RunConfig, task: Task, backbone: Backbone | None, console: C
             featurized.compute()
         featurized_aside = FeaturizedVideos(aside, backbone)
         kept[kind] = without_pixels(featurized_aside[index] for index in range(len(aside)))
-    looks = training.augmentation
-    varies = backbone is None and looks.applies(imported=expert.manifest.conversion is not None)
-    if varies:
+    imported = expert.manifest.conversion is not None
+    varied = backbone is None and training.augmentation.applies(imported)
+    if varied:
         console.print("the reward learns from videos of varying looks (augmentation)")
-    augmentation = looks if varies else None
     return Demos(
-        augmented(sources["expert"], augmentation),
-        augmented(sources["random"], augmentation),
+        augmented(sources["expert"], varied),
+        augmented(sources["random"], varied),
         kept if held_out else {},
-        augmentation,
+        varied,
         Verification(unverified),
     )
 

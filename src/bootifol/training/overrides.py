@@ -11,16 +11,8 @@ from typing import Any, TypeVar
 
 from bootifol.errors import BootifolError, shortened
 from bootifol.training.config import TrainingConfig
-from bootifol.training.run_config import fits
 
 _Section = TypeVar("_Section")
-_WORDS = {
-    int: "a whole number",
-    float: "a number",
-    str: "a text",
-    bool: "true or false",
-    type(None): "nothing",
-}
 
 
 def overridden(
@@ -94,22 +86,10 @@ def _collect(overrides: Mapping[str, Any], before: str, values: dict[str, Any], 
                     f"{where}: {name} is a section and cannot be {shortened(value)}: name its fields ({fields}, …)"
                 )
             _collect(value, f"{name}.", values, where)
-        elif not fits(value, kind):
-            raise BootifolError(f"{where}: {name} cannot be {shortened(value)}; it is {_in_words(kind)}")
-        elif values.setdefault(name, _as_kind(value, kind)) != value:
+        elif isinstance(value, Mapping):
+            raise BootifolError(f"{where}: {name} cannot be {shortened(value)}")
+        elif values.setdefault(name, value) != value:
             raise BootifolError(f"{where}: {name} is named twice, with two values: leave one out")
-
-
-def _as_kind(value: Any, kind: Any) -> Any:
-    """1 as 1.0 where a field has fractions, so that it is written down as the command line's is."""
-    kinds = typing.get_args(kind) or (kind,)
-    return float(value) if type(value) is int and float in kinds and int not in kinds else value
-
-
-def _in_words(kind: Any) -> str:
-    if typing.get_origin(kind) is typing.Literal:
-        return " or ".join(map(str, typing.get_args(kind)))
-    return " or ".join(_WORDS[choice] for choice in typing.get_args(kind) or (kind,))
 
 
 def _replaced(section: _Section, values: Mapping[str, Any]) -> _Section:

@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import sys
-import types
-import typing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any
+
+from pydantic import Field, Strict
 
 from bootifol.checksums import is_as_written
-from bootifol.errors import (
-    LARGEST_COUNT,
-    LARGEST_SEED,
-    BootifolError,
-    require_at_least,
-    require_at_most,
-    shortened,
-)
+from bootifol.errors import LARGEST_SEED, BootifolError, shortened
 from bootifol.files import read_json, write_json
 from bootifol.old_names import with_todays_names
 from bootifol.plugins import require_trust
+from bootifol.settings import Number, as_settings, settings
 from bootifol.tasks import Task, task_named
 from bootifol.training.config import TrainingConfig
 from bootifol.training.provenance import versions, videos_in
@@ -30,29 +23,22 @@ from bootifol.training.provenance import versions, videos_in
 FORMAT = 1
 MOST_BEFORE_ACTING = 0.5
 """Of a time budget, for alignment and cloning together."""
-_Config = TypeVar("_Config")
 
 
 @dataclass(frozen=True)
+@settings("")
 class RunConfig:
     """Everything that determines a run."""
 
     task: str
     method: str
     preset: str
-    seed: int
+    seed: Annotated[int, Strict(), Field(ge=0, le=LARGEST_SEED)]
     demos: str
     """Directory of the demo sets."""
-    time_budget: float | None
+    time_budget: Number | None
     """Seconds of wall-clock time for learning, or None for the preset's agent steps."""
     training: TrainingConfig
-
-    def __post_init__(self) -> None:
-        require_at_least(0, seed=self.seed)
-        require_at_most(LARGEST_SEED, seed=self.seed)
-        if self.time_budget is not None:
-            require_at_least(0, time_budget=self.time_budget)
-            require_at_most(LARGEST_COUNT, time_budget=self.time_budget)
 
     def resolved_task(self) -> Task:
         """The task with the lengths that this run gives its episodes."""
@@ -124,18 +110,14 @@ class RunConfig:
             raise BootifolError(
                 f"{path} is not a configuration in format {FORMAT}; was it written by bootifol?"
             )
-        hints = typing.get_type_hints(cls)
+        fields = {field.name: data[field.name] for field in dataclasses.fields(cls) if field.name in data}
         try:
-            run = cls(
-                **{
-                    name: _checked(data[name], hints[name], name, path)
-                    for name in hints
-                    if name != "training"
-                },
-                training=from_json(TrainingConfig, todays_fields(data["config"], path), path),
-            )
-        except KeyError as error:
-            raise BootifolError(f"{path} lacks {error}; restore the file or start a new run") from error
+            training = as_settings(TrainingConfig, todays_fields(data.get("config"), path))
+            run = as_settings(cls, fields | {"training": training})
+        except BootifolError as error:
+            raise BootifolError(
+                f"{path}: {error}; restore the file, go on with the version that made the run, or start a new one"
+            ) from error
         require_trust(path, "task", run.task, trust)
         if needs_method or run.training.agent.observations == "encodings":
             require_trust(path, "method", run.method, trust)
@@ -167,55 +149,8 @@ def todays_fields(data: Any, path: Path) -> Any:
     data = with_todays_names(data)
     if "tensorboard" not in data:
         return data
-    wanted = _checked(data["tensorboard"], bool, "tensorboard", path)
+    wanted = data["tensorboard"]
+    if not isinstance(wanted, bool):
+        raise BootifolError(f"{path}: tensorboard must be true or false, not {shortened(wanted)}")
     others = {name: value for name, value in data.items() if name != "tensorboard"}
     return {"tracker": "tensorboard" if wanted else "none"} | others
-
-
-def from_json(kind: type[_Config], data: Any, path: Path) -> _Config:
-    """Rebuilds a nested frozen dataclass from what `dataclasses.asdict` and JSON made of it.
-
-    Raises:
-        BootifolError: a field is unknown to this version, or its value is none that it can have.
-    """
-    if not isinstance(data, dict):
-        raise BootifolError(
-            f"{path} is damaged: it has {shortened(data)} in place of the fields of {kind.__name__}"
-        )
-    hints = typing.get_type_hints(kind)
-    unknown = sorted(set(data) - set(hints))
-    if unknown:
-        raise BootifolError(
-            f"{path} names {', '.join(unknown)[:300]}, which this version of bootifol does not know: go on with the "
-            "version that made the run, or start a new one"
-        )
-    values: dict[str, Any] = {}
-    for name, value in data.items():
-        if dataclasses.is_dataclass(hints[name]):
-            values[name] = from_json(typing.cast(type, hints[name]), value, path)
-        else:
-            values[name] = _checked(value, hints[name], name, path)
-    try:
-        return kind(**values)
-    except BootifolError as error:
-        raise BootifolError(f"{path}: {error}") from error
-
-
-def _checked(value: Any, kind: Any, name: str, path: Path) -> Any:
-    """A field's value as JSON has it, if it is of the field's type; dataclasses check the rest."""
-    if not fits(value, kind):
-        raise BootifolError(
-            f"{path} says that {name} is {shortened(value)}, which it cannot be: correct or restore the file"
-        )
-    return value
-
-
-def fits(value: Any, kind: Any) -> bool:
-    """Whether a value as JSON and YAML have it is of a field's type."""
-    if typing.get_origin(kind) in (typing.Union, types.UnionType):
-        return any(fits(value, choice) for choice in typing.get_args(kind))
-    if typing.get_origin(kind) is typing.Literal:
-        return isinstance(value, str | int) and value in typing.get_args(kind)
-    if kind in (int, float):
-        return isinstance(value, (int, kind)) and not isinstance(value, bool) and math.isfinite(value)
-    return isinstance(value, kind)

@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Literal
 
-from bootifol.errors import (
-    BootifolError,
-    fields_of,
-    require_at_least,
-    require_below_one,
-    require_choices,
-    require_positive,
-)
+from bootifol.errors import BootifolError
 from bootifol.rewards.bootifol.frames.config import FrameConfig
+from bootifol.rewards.network_config import NetworkConfig
+from bootifol.settings import AtLeastTwo, BelowOne, Count, Flag, Number, Positive, settings
 
 NAME = "BootIfOL"
 """In tables and figures, as the paper has it."""
@@ -49,7 +43,8 @@ CAPTIONS = {
 
 
 @dataclass(frozen=True)
-class BootifolConfig:
+@settings("reward.bootifol")
+class BootifolConfig(NetworkConfig):
     """BootIfOL's reward model."""
 
     reward: Literal["distance", "cosine", "frames"] = "distance"
@@ -68,7 +63,7 @@ class BootifolConfig:
     the Hugging Face hub, such as google/efficientnet-b0 (the paper's) or facebook/dinov2-small, or a directory with
     one; most want pictures.video_size 224."""
 
-    references: int = 1
+    references: Count = 1
     """Expert videos an episode is compared with; its reward is the mean at every time step. The paper has one."""
 
     reward_scale: Literal["none", "alignment"] = "none"
@@ -76,103 +71,65 @@ class BootifolConfig:
     the expert and the other (random) videos at the end of the Alignment Phase. A random episode then gets about 0
     at every step and a perfect one 1, whatever the encoder's units and however distances grow with time."""
 
-    multiview_weight: float = 1.0
+    multiview_weight: Number = 1.0
     """Weight of L_S."""
 
-    triplet_weight: float = 1.0
+    triplet_weight: Number = 1.0
     """Weight of L_triplet."""
 
-    autoencoder_weight: float = 1.0
+    autoencoder_weight: Number = 1.0
     """Weight of L_ae; 0 leaves the decoder out."""
 
-    prediction_weight: float = 1.0
+    prediction_weight: Number = 1.0
     """Weight of L_Z."""
 
-    sequence_weight: float = 1.0
+    sequence_weight: Number = 1.0
     """Weight of L_O."""
 
-    sequence_times: int = 1
+    sequence_times: Count = 1
     """L_O is the mean over the encodings of this many prefixes, evenly spaced up to the whole video; 1, as in the
     paper, takes the whole video alone, though rewards read the encodings of all prefixes."""
 
-    temperature: float = 0.07
+    temperature: Positive = 0.07
     """tau of the similarity h(a, b) = exp(cos(a, b) / tau)."""
 
-    margin: float = 1.0
+    margin: Number = 1.0
     """rho of L_triplet."""
 
-    window: int = 2
+    window: Count = 2
     """L_triplet: a positive is at most this many frames from its anchor, a negative is farther."""
 
-    predicted_states: int = 2
+    predicted_states: Count = 2
     """K of L_Z: how many states are predicted, each from the one before."""
 
-    frame_drop: float = 0.05
+    frame_drop: BelowOne = 0.05
     """Chance that a frame index is left out of a batch, the same indices in all its videos."""
 
-    videos_per_class: int = 16
+    videos_per_class: AtLeastTwo = 16
     """n: a batch has n expert videos and n others."""
 
-    time_corrupted_fraction: float = 0.0
-    """Beyond the paper: fraction of the other videos that are expert videos corrupted in time (`time_corrupted.py`); 0,
-    as in the paper, none."""
-
-    frames_per_video: int | None = None
+    frames_per_video: Count | None = None
     """Frames of each video on which L_S, L_triplet and L_ae are computed, drawn anew every step; none (the paper)
     means all. L_Z and L_O always read every frame."""
 
-    width_divisor: int = 1
-    """Divides the channels of the frame encoders and the decoder; 1 is the paper's network."""
-
-    motion: bool = False
+    motion: Flag = False
     """Beyond the paper: f also reads how the state changed since the frame before; false is the paper's network."""
 
-    leak: float = 0.2
-    """Slope of LeakyReLU below zero."""
-
-    learning_rate: float = 1e-4
-    """Of Adam."""
-
-    precision: Literal["fp32", "bf16"] = "fp32"
-    """bf16 computes the convolutions in bfloat16; parameters, LSTM, losses and Adam stay in float32."""
-
     def __post_init__(self) -> None:
-        of_self = partial(fields_of, "bootifol", self)
-        require_choices("bootifol", self)
-        counts = (
-            "references",
-            "sequence_times",
-            "predicted_states",
-            "window",
-            "frames_per_video",
-            "width_divisor",
-        )
-        require_at_least(1, **of_self(*counts))
-        losses = ("multiview", "triplet", "autoencoder", "prediction", "sequence")
-        require_at_least(0, **of_self("margin", *(f"{loss}_weight" for loss in losses)))
-        require_positive(**of_self("temperature", "learning_rate"))
-        require_below_one(**of_self("time_corrupted_fraction", "frame_drop", "leak"))
         of_backbone = ("triplet", "prediction", "sequence")
-        learned = of_backbone if self.backbone else losses
-        if not any(getattr(self, f"{loss}_weight") for loss in learned):
+        losses = of_backbone if self.backbone else ("multiview", "autoencoder", *of_backbone)
+        if not any(getattr(self, f"{loss}_weight") for loss in losses):
             raise BootifolError(
-                f"bootifol: {', '.join(f'{loss}_weight' for loss in learned)} are all 0, so nothing would be learned; "
-                "give one of them"
+                f"reward.bootifol: {', '.join(f'{loss}_weight' for loss in losses)} are all 0, so nothing would be "
+                "learned; give one of them"
             )
         if self.reward == "frames" and self.backbone is not None:
             raise BootifolError(
-                "bootifol: reward frames has eyes of its own and reads no backbone; leave one of them out, or take "
-                "reward distance and an agent that reads pictures, as --preset cpu does"
+                "reward.bootifol: reward frames has eyes of its own and reads no backbone; leave one of them out, or "
+                "take reward distance and an agent that reads pictures, as --preset cpu does"
             )
-        if self.videos_per_class < 2:
-            raise BootifolError(
-                f"bootifol: videos_per_class is {self.videos_per_class}, but L_O compares an expert video "
-                "with another one, so it must be at least 2"
-            )
-        if self.width_divisor > 32:
-            raise BootifolError(f"bootifol: width_divisor must be at most 32, not {self.width_divisor}")
         if self.reward_scale == "alignment" and self.reward == "cosine":
             raise BootifolError(
-                "bootifol: reward_scale alignment is for the distance reward; the cosine lies in [-1, 1] already, "
-                "so use reward_scale none"
+                "reward.bootifol: reward_scale alignment is for the distance reward; the cosine lies in [-1, 1] "
+                "already, so use reward_scale none"
             )

@@ -19,7 +19,6 @@ from bootifol.rewards.bootifol.config import BootifolConfig
 from bootifol.rewards.bootifol.networks import BootifolNetworks
 from bootifol.rewards.bootifol.sampling import Draw, draw
 from bootifol.rewards.bootifol.scale import DistanceScale
-from bootifol.rewards.bootifol.time_corrupted import time_corrupted
 from bootifol.rewards.learned import LearnedRewardModel
 from bootifol.rewards.video_checks import check_references
 from bootifol.types import (
@@ -133,12 +132,8 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         """Algorithm 1: sample n and n videos, evaluate L, optimize theta, gamma, omega, phi."""
         n = self.config.videos_per_class
         expert_videos, other_videos = self._read(expert, n), self._read(other, n)
-        time_corrupted_count = int(self.config.time_corrupted_fraction * n)
         length = min(expert_videos.shape[1], other_videos.shape[1])
         videos = np.concatenate([expert_videos[:, :length], other_videos[:, :length]])
-        if time_corrupted_count:
-            shown = self._read(expert, time_corrupted_count)
-            videos[-time_corrupted_count:] = time_corrupted(shown[:, :length], self._rng)
         drawn = draw(self.config, 2 * n, length, self._rng)
         step = self._begin_step()
         total, terms, distances = self._losses(videos[:, drawn.kept], drawn)
@@ -147,7 +142,7 @@ class BootifolRewardModel(LearnedRewardModel[BootifolConfig, BootifolNetworks]):
         measured = to_host(distances).astype(np.float64)
         self.version += 1
         if scaling:
-            self._scale.observe(drawn.kept, measured[: n - time_corrupted_count].mean(0))
+            self._scale.observe(drawn.kept, measured.mean(0))
         return {**metrics, "distance/expert_other": float(measured.mean())}
 
     def _losses(

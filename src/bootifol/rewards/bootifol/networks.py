@@ -11,6 +11,9 @@ from bootifol.networks.frame_encoders import FrameEncoder
 from bootifol.networks.sequence_encoder import SequenceEncoder, StatePredictor
 from bootifol.rewards.bootifol.config import BootifolConfig
 
+LEAK = 0.2
+"""Slope of LeakyReLU below zero."""
+
 
 class BootifolNetworks(nn.Module):
     """g_theta, q_gamma, f_omega and d_phi.
@@ -27,13 +30,13 @@ class BootifolNetworks(nn.Module):
         self.frame_encoder: FrameEncoder | FeatureEncoder
         self.frame_decoder: FrameDecoder | None
         if feature_size is None:
-            self.frame_encoder = FrameEncoder(video_size, config.width_divisor, config.leak)
-            self.frame_decoder = FrameDecoder(video_size, config.width_divisor, config.leak)
+            self.frame_encoder = FrameEncoder(video_size, config.width_divisor, LEAK)
+            self.frame_decoder = FrameDecoder(video_size, config.width_divisor, LEAK)
         else:
-            self.frame_encoder = FeatureEncoder(feature_size, config.leak)
+            self.frame_encoder = FeatureEncoder(feature_size, LEAK)
             self.frame_decoder = None
         self.sequence_encoder = SequenceEncoder(config.motion)
-        self.state_predictor = StatePredictor(config.leak)
+        self.state_predictor = StatePredictor(LEAK)
 
     def encode_and_predict(
         self, states: torch.Tensor, start: int, count: int

@@ -21,6 +21,9 @@ FEATURES = 1024
 HALVINGS = 2 ** len(WIDTHS)
 """What the strided layers divide the side of a picture by."""
 
+LEAK = 0.2
+"""Slope of LeakyReLU below zero."""
+
 Skips = list[torch.Tensor]
 """What the context encoder's strided layers gave, large pictures first; the decoder reads them again."""
 
@@ -29,7 +32,7 @@ class Encoder(nn.Module):
     """Enc1 or Enc2: four 5x5 stride-2 convolutions, each halving the picture, and two fully connected layers.
 
     Args:
-        config: widths and leak.
+        config: widths.
         video_size: side of the pictures, a multiple of 16.
         activated: whether the features pass LeakyReLU (Enc1, as in the authors' release) or not (Enc2).
     """
@@ -38,7 +41,6 @@ class Encoder(nn.Module):
         super().__init__()
         widths = [3, *(width // config.width_divisor for width in WIDTHS)]
         features = FEATURES // config.width_divisor
-        self.leak = config.leak
         self.activated = activated
         self.strided = nn.ModuleList(nn.Conv2d(*between, 5, 2, 2) for between in pairwise(widths))
         self.hidden = nn.Linear(widths[-1] * (video_size // HALVINGS) ** 2, features)
@@ -48,10 +50,10 @@ class Encoder(nn.Module):
         """Pictures `[N, 3, H, W]` in [-1, 1] to features `[N, D]` and the four layers before them."""
         skips: Skips = []
         for layer in self.strided:
-            pictures = F.leaky_relu(layer(pictures), self.leak)
+            pictures = F.leaky_relu(layer(pictures), LEAK)
             skips.append(pictures)
-        features = self.output(F.leaky_relu(self.hidden(pictures.flatten(1)), self.leak))
-        return F.leaky_relu(features, self.leak) if self.activated else features, skips
+        features = self.output(F.leaky_relu(self.hidden(pictures.flatten(1)), LEAK))
+        return F.leaky_relu(features, LEAK) if self.activated else features, skips
 
 
 class Translator(nn.Module):
@@ -61,7 +63,7 @@ class Translator(nn.Module):
         super().__init__()
         features = FEATURES // config.width_divisor
         self.layers = nn.Sequential(
-            nn.Linear(2 * features, features), nn.LeakyReLU(config.leak), nn.Linear(features, features)
+            nn.Linear(2 * features, features), nn.LeakyReLU(LEAK), nn.Linear(features, features)
         )
 
     def forward(self, features: torch.Tensor, context: torch.Tensor) -> torch.Tensor:
@@ -79,7 +81,6 @@ class Decoder(nn.Module):
     def __init__(self, config: ContextTranslationConfig, video_size: int) -> None:
         super().__init__()
         widths = [*(width // config.width_divisor for width in WIDTHS[::-1]), 3]
-        self.leak = config.leak
         self.smallest = (widths[0], video_size // HALVINGS, video_size // HALVINGS)
         self.hidden = nn.Linear(FEATURES // config.width_divisor, widths[0] * self.smallest[1] ** 2)
         self.strided = nn.ModuleList(
@@ -91,7 +92,7 @@ class Decoder(nn.Module):
         """Features `[N, D]` and the context's layers to pictures `[N, 3, H, W]`."""
         pictures = self.hidden(features).unflatten(1, self.smallest)
         for layer, skip in zip(self.strided, reversed(skips), strict=True):
-            pictures = layer(torch.cat([F.leaky_relu(pictures, self.leak), skip], 1))
+            pictures = layer(torch.cat([F.leaky_relu(pictures, LEAK), skip], 1))
         return cast(torch.Tensor, pictures)
 
 

@@ -24,15 +24,8 @@ def discriminator_loss(expert: torch.Tensor, other: torch.Tensor) -> torch.Tenso
     return F.softplus(-expert.float()).mean() + F.softplus(other.float()).mean()
 
 
-def reward(logits: torch.Tensor, kind: str) -> torch.Tensor:
-    """What the agent gets for the stacks it made, float32 of the logits' shape.
-
-    Args:
-        logits: x.
-        kind: softplus `-log(1 - D)`, log_sigmoid `log D`, or logit `log D - log(1 - D) = x`.
+def reward(logits: torch.Tensor) -> torch.Tensor:
+    """`-log(1 - D)`, what the agent gets for the stacks it made (the paper and the public image version): float32 of
+    the logits' shape, never below 0.
     """
-    if kind == "softplus":
-        return F.softplus(logits.float())
-    if kind == "log_sigmoid":
-        return F.logsigmoid(logits.float())
-    return logits.float()
+    return F.softplus(logits.float())

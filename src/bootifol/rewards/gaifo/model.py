@@ -11,7 +11,7 @@ from bootifol.devices import to_device, to_host
 from bootifol.errors import BootifolError
 from bootifol.rewards.gaifo import losses
 from bootifol.rewards.gaifo.config import GaifoConfig
-from bootifol.rewards.gaifo.networks import Discriminator
+from bootifol.rewards.gaifo.networks import STACK, Discriminator
 from bootifol.rewards.gaifo.stacks import as_pictures, draw_stacks, stack_frames
 from bootifol.rewards.learned import LearnedRewardModel
 from bootifol.types import FrameBatch, Metrics, Rewards, StepMetrics, Video, VideoSource
@@ -55,13 +55,13 @@ class GaifoRewardModel(LearnedRewardModel[GaifoConfig, Discriminator]):
         if len(frames) < 2:
             return np.zeros(0, np.float32)
         ends = np.arange(1, len(frames))
-        indices = stack_frames(ends, self.config.stack)
+        indices = stack_frames(ends, STACK)
         with self._evaluating():
             logits = [
                 self._logits(as_pictures(frames[part]))
                 for part in np.split(indices, range(LABEL_BATCH, len(indices), LABEL_BATCH))
             ]
-            return to_host(losses.reward(torch.cat(logits), self.config.reward))
+            return to_host(losses.reward(torch.cat(logits)))
 
     def _step(self, expert: VideoSource, other: VideoSource) -> Metrics:
         """Algorithm 1, "update the discriminator": sample as many stacks of either class, go down L_D once."""
@@ -73,7 +73,7 @@ class GaifoRewardModel(LearnedRewardModel[GaifoConfig, Discriminator]):
                 "the videos have one frame, but the discriminator looks at changes between frames; use longer videos"
             )
         stacks = [
-            draw_stacks(of_class[:, :length], self.config.stacks_per_video, self.config.stack, self._rng)
+            draw_stacks(of_class[:, :length], self.config.stacks_per_video, STACK, self._rng)
             for of_class in videos
         ]
         step = self._begin_step()

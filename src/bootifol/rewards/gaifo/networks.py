@@ -11,6 +11,12 @@ from torch import nn
 from bootifol.networks.frame_encoders import strided_layers
 from bootifol.rewards.gaifo.config import GaifoConfig
 
+LEAK = 0.01
+"""Slope of LeakyReLU below zero."""
+
+STACK = 3
+"""Successive frames that the discriminator sees at once."""
+
 POINTWISE_WIDTHS = (512, 128, 32)
 """Channels of the 1x1 layers before the logit, as in the public image version; they cost too little to divide."""
 
@@ -28,12 +34,12 @@ class Discriminator(nn.Module):
 
     def __init__(self, config: GaifoConfig, video_size: int) -> None:
         super().__init__()
-        self.strided, width = strided_layers(3 * config.stack, video_size, config.width_divisor, config.leak)
+        self.strided, width = strided_layers(3 * STACK, video_size, config.width_divisor, LEAK)
         self.pointwise = nn.Sequential()
         for before, after in pairwise([width, *POINTWISE_WIDTHS]):
             self.pointwise.append(nn.Linear(before, after, bias=False))
             self.pointwise.append(nn.BatchNorm1d(after))
-            self.pointwise.append(nn.LeakyReLU(config.leak))
+            self.pointwise.append(nn.LeakyReLU(LEAK))
         self.pointwise.append(nn.Linear(POINTWISE_WIDTHS[-1], 1))
 
     def forward(self, stacks: torch.Tensor) -> torch.Tensor:

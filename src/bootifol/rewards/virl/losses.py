@@ -7,35 +7,26 @@ loss is a mean, so its size does not depend on the batch. All sums run in float3
 
 from __future__ import annotations
 
-from typing import Literal
-
 import torch
-
-Distance = Literal["euclidean", "squared"]
 
 
 def siamese_loss(
-    anchor: torch.Tensor,
-    positive: torch.Tensor,
-    negative: torch.Tensor,
-    margin: float,
-    distance: Distance = "euclidean",
+    anchor: torch.Tensor, positive: torch.Tensor, negative: torch.Tensor, margin: float
 ) -> torch.Tensor:
     """L_SNX, Eq. (3): `d(f_i, f_p) + max(rho - d(f_i, f_n), 0)`, averaged over the anchors.
 
     With h, the encodings of sequences, it is L_SNS; with e, those of frames (averaged over time, Eq. 4), L_SNI.
 
-    `d` is `||a - b||` (euclidean, Eq. 3) or the squared difference averaged over the dimensions (squared, the public
-    release). Differs from the release also in that the margin is that of each anchor, not of the batch's mean distance.
+    `d` is `||a - b||`. Differs from the release in that, there the mean square over the dimensions, which near zero
+    hardly has a gradient, and in that the margin is that of each anchor, not of the batch's mean distance.
 
     Args:
         anchor: f_i `[..., D]`.
         positive: f_p `[..., D]`.
         negative: f_n `[..., D]`.
         margin: rho.
-        distance: d.
     """
-    near, far = (_distance(anchor, other, distance) for other in (positive, negative))
+    near, far = (_distance(anchor, other) for other in (positive, negative))
     return (near + (margin - far).clamp(min=0)).mean()
 
 
@@ -55,10 +46,7 @@ def reconstruction_loss(pictures: torch.Tensor, decoded: torch.Tensor) -> torch.
     return (decoded.float() - pictures.float()).square().mean()
 
 
-def _distance(a: torch.Tensor, b: torch.Tensor, distance: Distance) -> torch.Tensor:
+def _distance(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     """d of vectors `[..., D]`: float32 `[...]`. The gradient of a Euclidean distance of 0 is 0."""
-    difference = a.float() - b.float()
-    if distance == "squared":
-        return difference.square().mean(-1)
-    norm: torch.Tensor = torch.linalg.vector_norm(difference, dim=-1)
+    norm: torch.Tensor = torch.linalg.vector_norm(a.float() - b.float(), dim=-1)
     return norm

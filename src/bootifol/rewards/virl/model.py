@@ -21,6 +21,12 @@ PAIR = 2
 """Eq. (4) reconstructs the anchor and its positive. Positives come from the same videos as anchors, so every anchor is
 reconstructed once and counted twice."""
 
+MARGIN = 1.0
+"""rho of both triplet losses."""
+
+NOISE = 0.05
+"""Standard deviation of the noise added to a positive copy; pictures lie in [0, 1]."""
+
 
 class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
     """A distance between videos, learned by siamese networks while the agent acts.
@@ -90,10 +96,7 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
             "sequence_triplet": (h_anchor, h_positive, h_negative),
             "frame_triplet": (anchor, positive, negative),
         }
-        terms = {
-            name: losses.siamese_loss(*encodings, config.margin, config.distance)
-            for name, encodings in compared.items()
-        }
+        terms = {name: losses.siamese_loss(*encodings, MARGIN) for name, encodings in compared.items()}
         decoded = self._on_device(drawn.decoded)
         rows = torch.arange(count, device=self.device)[:, None]
         targets = by_video[rows, decoded].flatten(0, 1)
@@ -133,9 +136,7 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
         """Minus the reward, from the differences of e and of h, each `[..., 128]`."""
         of_frames: torch.Tensor = torch.linalg.vector_norm(frames, dim=-1)
         of_sequences: torch.Tensor = torch.linalg.vector_norm(sequences, dim=-1)
-        if self.config.reward == "frame":
-            return of_frames
-        return of_sequences if self.config.reward == "sequence" else of_frames + of_sequences
+        return of_frames + of_sequences
 
     def _encode(self, video: Video) -> tuple[torch.Tensor, torch.Tensor]:
         """e and h, each `[T + 1, 128]`, in evaluation mode: a frame's e depends on that frame alone."""
@@ -152,4 +153,4 @@ class VirlRewardModel(LearnedRewardModel[VirlConfig, VirlNetworks]):
     def _with_noise(self, pictures: torch.Tensor) -> torch.Tensor:
         """Videos `[k, T' + 1, 3, H, W]` with Gaussian noise on every number."""
         noise = self._on_device(self._rng.standard_normal(tuple(pictures.shape), dtype=np.float32))
-        return pictures + self.config.noise * noise.to(pictures)
+        return pictures + NOISE * noise.to(pictures)

@@ -14,6 +14,9 @@ from bootifol.rewards.virl.config import VirlConfig
 
 RGB = 3
 
+LEAK = 0.01
+"""Slope of LeakyReLU below zero."""
+
 
 class SequenceDecoder(nn.Module):
     """omega's counterpart: unrolls the encoding of a video into the encodings of its frames, first to last.
@@ -42,8 +45,8 @@ class VirlNetworks(nn.Module):
 
     def __init__(self, config: VirlConfig, video_size: int) -> None:
         super().__init__()
-        self.frame_encoder = ViewEncoder(RGB, video_size, config.width_divisor, config.leak, STATE_SIZE)
-        self.frame_decoder = FrameDecoder(video_size, config.width_divisor, config.leak)
+        self.frame_encoder = ViewEncoder(RGB, video_size, config.width_divisor, LEAK, STATE_SIZE)
+        self.frame_decoder = FrameDecoder(video_size, config.width_divisor, LEAK)
         self.sequence_encoder = SequenceEncoder()
         self.sequence_decoder = SequenceDecoder()
 

@@ -23,6 +23,13 @@ FEWEST_FRAMES = 4
 CHANGED_FRAMES = 0.1
 """Fraction of the frames that a positive copy swaps or shows twice; the paper's main text gives none."""
 
+ALTERED_FRACTION = 0.5
+"""Chance that an anchor's positive and negative are altered copies of itself; otherwise the positive is another video
+of its class, and the negative one of the other class. The paper's main text has both kinds and gives no fraction."""
+
+FRAME_DROP = 0.05
+"""Chance that a frame index is left out of a batch, the same indices in all its videos."""
+
 
 @dataclass(frozen=True)
 class Draw:
@@ -57,10 +64,10 @@ def draw(config: VirlConfig, frames: int, rng: np.random.Generator) -> Draw:
             "order; use longer videos"
         )
     n = config.videos_per_class
-    kept = _kept(config, frames, rng)
+    kept = _kept(frames, rng)
     length = len(kept)
     in_order = np.arange(length)
-    altered = rng.random(2 * n) < config.altered_fraction
+    altered = rng.random(2 * n) < ALTERED_FRACTION
     positives = np.concatenate([np.roll(np.arange(n), -1), n + np.roll(np.arange(n), -1)])
     negatives = np.roll(np.arange(2 * n), n)
     positive_frames = np.tile(in_order, (2 * n, 1))
@@ -109,12 +116,11 @@ def out_of_order(length: int, rng: np.random.Generator) -> Indices:
     return order[::-1].copy()
 
 
-def _kept(config: VirlConfig, frames: int, rng: np.random.Generator) -> Indices:
-    """Cuts the end, frame i with `p(i) ~ frames - i`, and drops single frames."""
-    end = frames
-    if config.early_ends:
-        ends = np.arange(FEWEST_FRAMES, frames + 1)
-        chances = (frames + 1 - ends).astype(np.float64)
-        end = int(rng.choice(ends, p=chances / chances.sum()))
-    kept = np.flatnonzero(rng.random(end) >= config.frame_drop)
+def _kept(frames: int, rng: np.random.Generator) -> Indices:
+    """Cuts the end, frame i with `p(i) ~ frames - i` (the paper's early episode sequence priority), and drops single
+    frames."""
+    ends = np.arange(FEWEST_FRAMES, frames + 1)
+    chances = (frames + 1 - ends).astype(np.float64)
+    end = int(rng.choice(ends, p=chances / chances.sum()))
+    kept = np.flatnonzero(rng.random(end) >= FRAME_DROP)
     return kept if len(kept) >= FEWEST_FRAMES else np.arange(end)

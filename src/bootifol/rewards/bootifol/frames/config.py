@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
-from typing import Literal
 
-from bootifol.errors import fields_of, require_at_least, require_choices, require_fraction, require_positive
+from bootifol.settings import AtLeastTwo, Count, Fraction, Number, Positive, settings
 
 CAPTIONS = {
     "loss/frame": (
@@ -36,74 +34,55 @@ CAPTIONS = {
 
 
 @dataclass(frozen=True)
+@settings("reward.bootifol.frames")
 class FrameConfig:
     """The frame contrast, its eyes and its head; read where the reward is `frames`."""
 
-    frame_weight: float = 0.5
+    frame_weight: Number = 0.5
     """Weight of L_F, which tells the expert's frames from others."""
 
-    late_from: float = 0.5
+    late_from: Fraction = 0.5
     """c of L_F: the part of an expert video after which a frame counts as the expert's in full; before it, the less the
     earlier it is. 0 counts every frame alike."""
 
-    episode_weight: float = 0.3
+    episode_weight: Number = 0.3
     """Weight of L_E, which tells what is one episode's alone: where its goal lies. 0 leaves it out."""
 
-    time_weight: float = 0.5
+    time_weight: Number = 0.5
     """Weight of L_T, which tells the moments of one video apart. 0 leaves it out."""
 
-    exchange_weight: float = 0.0
+    exchange_weight: Number = 0.0
     """Weight of L_X, which tells halves of one video's states from halves of two. 0 leaves it out."""
 
-    agent_weight: float = 0.2
+    agent_weight: Number = 0.2
     """Weight of L_B, by which the agent's frames bootstrap the head in the Interactive Phase."""
 
-    temperature: float = 0.1
+    temperature: Positive = 0.1
     """tau of L_E and L_T."""
 
-    videos_per_class: int = 16
+    videos_per_class: AtLeastTwo = 16
     """Videos of either class in a gradient step of the Alignment Phase."""
 
-    moments: int = 3
+    moments: AtLeastTwo = 3
     """Moments of each of them in it; of each, a frame and one next to it."""
 
-    frames_per_class: int = 96
+    frames_per_class: Count = 96
     """Frames of either class in a gradient step of the Interactive Phase."""
 
-    random_fraction: float = 0.33
+    random_fraction: Fraction = 0.33
     """Fraction of random videos among the frames that are not the expert's in the Interactive Phase; the rest is the
     agent's."""
 
-    width: int = 16
+    width: Count = 16
     """Features of a cell of the eyes' map."""
 
-    hidden_dim: int = 128
-    """Width of the two hidden layers of the head."""
-
-    shift: int = 2
-    """Largest random shift of the pictures, in pixels, while the eyes learn."""
-
-    noise: float = 0.2
+    noise: Number = 0.2
     """Standard deviation of the noise on the states (of variance about 1) that the head learns from in the Interactive
     Phase. Less of it, and the head tells the agent's successes from the expert's by how they differ in detail, and
     takes their reward away; more, and it rewards near misses."""
 
-    learning_rate: float = 1e-3
+    learning_rate: Positive = 1e-3
     """Of Adam in the Alignment Phase."""
 
-    head_learning_rate: float = 3e-4
+    head_learning_rate: Positive = 3e-4
     """Of Adam in the Interactive Phase."""
-
-    precision: Literal["fp32", "bf16"] = "fp32"
-    """bf16 computes the convolutions in bfloat16 while they learn."""
-
-    def __post_init__(self) -> None:
-        of_self = partial(fields_of, "frames", self)
-        require_choices("frames", self)
-        require_at_least(
-            0, **of_self("frame_weight", "episode_weight", "time_weight", "exchange_weight", "shift", "noise")
-        )
-        require_at_least(1, **of_self("frames_per_class", "width", "hidden_dim"))
-        require_at_least(2, **of_self("videos_per_class", "moments"))
-        require_positive(**of_self("temperature", "learning_rate", "head_learning_rate"))
-        require_fraction(**of_self("random_fraction", "late_from"))

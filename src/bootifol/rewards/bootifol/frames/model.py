@@ -33,6 +33,9 @@ RANDOM_FRAMES = 4096
 EXPERT_FRAMES = 100_000
 """Most frames of the expert's that are kept so."""
 
+SHIFT = 2
+"""Largest random shift of the pictures, in pixels, while the eyes learn."""
+
 
 class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
     """How much a frame looks like the expert's, as a head on what the eyes make of it says.
@@ -189,8 +192,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         shifted = self._shifted(frames.reshape(-1, *frames.shape[2:]))
         step = self._begin_step()
         self._optimizer.param_groups[0]["lr"] = config.learning_rate
-        with self._autocast():
-            seen = self.networks.eyes(self._on_device(shifted)).float()
+        seen = self.networks.eyes(self._on_device(shifted))
         # As coarse as the states that will be kept.
         states = (seen + rounding(seen, self._rng)).unflatten(0, (len(frames), config.moments, 2))
         of_episode, of_time = self.networks.views(states)
@@ -231,12 +233,9 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
 
     def _shifted(self, frames: Frames) -> Frames:
         """Frames `[N, S, S, 3]`, each shifted at random by whole pixels, the border replicated."""
-        most = self.config.shift
-        if not most:
-            return frames
         size = frames.shape[1]
-        padded = np.pad(frames, ((0, 0), (most, most), (most, most), (0, 0)), mode="edge")
-        corners = self._rng.integers(0, 2 * most + 1, (len(frames), 2))
+        padded = np.pad(frames, ((0, 0), (SHIFT, SHIFT), (SHIFT, SHIFT), (0, 0)), mode="edge")
+        corners = self._rng.integers(0, 2 * SHIFT + 1, (len(frames), 2))
         return np.stack(
             [
                 picture[row : row + size, column : column + size]

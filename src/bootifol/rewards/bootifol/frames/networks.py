@@ -11,6 +11,9 @@ from torch import nn
 from bootifol.networks.eyes import STATE_SIZE, VIEW, Eyes
 from bootifol.rewards.bootifol.frames.config import FrameConfig
 
+HIDDEN_DIM = 128
+"""Width of the two hidden layers of the head."""
+
 
 class FrameNetworks(nn.Module):
     """Eyes, the head that rewards a state, and the projections that L_E and L_T contrast.
@@ -25,11 +28,11 @@ class FrameNetworks(nn.Module):
         self.eyes = Eyes(video_size, config.width)
         self.projections = nn.ModuleList([nn.Linear(VIEW, VIEW) for _ in range(2)])
         self.head = nn.Sequential(
-            nn.Linear(STATE_SIZE, config.hidden_dim),
+            nn.Linear(STATE_SIZE, HIDDEN_DIM),
             nn.ReLU(),
-            nn.Linear(config.hidden_dim, config.hidden_dim),
+            nn.Linear(HIDDEN_DIM, HIDDEN_DIM),
             nn.ReLU(),
-            nn.Linear(config.hidden_dim, 1),
+            nn.Linear(HIDDEN_DIM, 1),
         )
 
     def logits(self, states: torch.Tensor) -> torch.Tensor:
