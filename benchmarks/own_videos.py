@@ -1,11 +1,12 @@
 """How returns fall with fewer videos and with what phones do to them, and what `demos match` gives back.
 
-    python -m benchmarks.own_videos --out results/own_videos/drawn_home.csv --work runs/own_videos
-    python -m benchmarks.own_videos --out results/own_videos/drawn_home.csv --figure docs/images/own_videos.png
+    python -m benchmarks.own_videos --task drawn_home --out results/own_videos/drawn_home.csv --work runs/own_videos
+    python -m benchmarks.own_videos --task drawn_home --out results/own_videos/drawn_home.csv \
+        --figure docs/images/own_videos.png
 
-Expert videos of drawn_home are enlarged, disturbed as a camera would, written as mp4 files, imported, matched where the
-row says so, and learned from (preset drawn, the reward at rest after alignment, as docs/your_own_videos.md does it).
-Each row of OUT.csv is one run; rows that are there are not run again.
+A task's expert videos are enlarged, disturbed as a camera would, written as mp4 files, imported, matched where the row
+says so, and learned from with the reward at rest after alignment, as docs/your_own_videos.md does it. Each row of
+OUT.csv is one run; rows that are there are not run again.
 
 - jitter: a hand that trembles by up to 3 % of the picture.
 - exposure: brightness that drifts by 15 % within a video, and a white balance of its own.
@@ -45,7 +46,15 @@ from bootifol.reports.style import house_style, save_png
 from bootifol.tasks import task_named
 from bootifol.types import Frames
 
-TASK, SIZE, RATE = "drawn_home", 32, 10
+SIZES = {"drawn_home": 32, "reacher_hard": 64}
+"""Height and width in pixels of the videos that are learned from, by task."""
+
+OPTIONS = {
+    "drawn_home": ("--preset", "drawn_pixels", "--interactive.reward-updates-until", "0"),
+    "reacher_hard": ("--preset", "frames", "--interactive.agent-steps", "50000"),
+}
+"""Of `bootifol train`, by task; in `frames`, rewards that were learned from files rest."""
+
 FILMED = 256
 """Height in pixels of the files."""
 
@@ -70,7 +79,7 @@ GRID = (
 
 
 def disturbed(frames: Frames, kind: str, rng: np.random.Generator) -> Frames:
-    """What a camera makes of a video `[n, 32, 32, 3]`: uint8 `[n, height, width, 3]`."""
+    """What a camera makes of a video `[n, S, S, 3]`: uint8 `[n, height, width, 3]`."""
     every = kind == "phone"
     shown = np.stack(
         [
@@ -105,11 +114,11 @@ def disturbed(frames: Frames, kind: str, rng: np.random.Generator) -> Frames:
     return shown
 
 
-def write_files(frames: NDArray[np.uint8], path: Path, kind: str) -> None:
+def write_file(frames: NDArray[np.uint8], path: Path, kind: str, rate: float) -> None:
     """One mp4 file, H.264 or, where the disturbance says so, H.265."""
     hevc = kind in ("h265", "phone")
     with av.open(str(path), "w") as container:
-        stream: Any = container.add_stream("libx265" if hevc else "libx264", rate=RATE)
+        stream: Any = container.add_stream("libx265" if hevc else "libx264", rate=round(rate))
         stream.options = {"crf": "34", "x265-params": "log-level=none"} if hevc else {"crf": "18"}
         stream.height, stream.width = frames.shape[1:3]
         stream.pix_fmt = "yuv420p"
@@ -121,27 +130,32 @@ def write_files(frames: NDArray[np.uint8], path: Path, kind: str) -> None:
         container.mux(stream.encode(None))
 
 
-def demos_of(work: Path, videos: int, kind: str, matched: bool) -> Path:
+def demos_of(task: str, work: Path, videos: int, kind: str, matched: bool) -> Path:
     """The demo sets of one row, made once."""
     plain = work / "demos" / f"{videos}_{kind}"
     if not plain.exists():
         expert = DemoSet.open(work / "recorded" / "expert")
+        rate = expert.manifest.frames_per_second
+        assert rate is not None
         files = work / "files" / f"{videos}_{kind}"
         shutil.rmtree(files, ignore_errors=True)
         files.mkdir(parents=True)
         with progress(f"filming {videos} of {kind}", total=videos) as advance:
             for index in range(videos):
                 rng = np.random.default_rng([7, index])
-                write_files(disturbed(expert[index].frames, kind, rng), files / f"{index:04d}.mp4", kind)
+                filmed = disturbed(expert[index].frames, kind, rng)
+                write_file(filmed, files / f"{index:04d}.mp4", kind, rate)
                 advance()
-        import_videos([files], plain / "expert", Conversion(31, SIZE, frames_per_second=RATE))
+        import_videos(
+            [files], plain / "expert", Conversion(expert.manifest.frames, SIZES[task], frames_per_second=rate)
+        )
         shutil.copytree(work / "recorded" / "random", plain / "random")
         shutil.rmtree(files)
     if not matched:
         return plain
     out = work / "demos" / f"{videos}_{kind}_matched"
     if not out.exists():
-        match_demo_sets(plain, task_named(TASK), out)
+        match_demo_sets(plain, task_named(task), out)
     return out
 
 
@@ -150,6 +164,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("--task", choices=SIZES, required=True)
     parser.add_argument("--out", type=Path, required=True, help="the CSV file")
     parser.add_argument(
         "--work", type=Path, default=Path("runs/own_videos"), help="directory for demos and runs"
@@ -161,9 +176,10 @@ def main() -> None:
     if arguments.figure is not None:
         save_png(drawn(table), arguments.figure)
         return
-    pictures = PictureConfig(agent_size=SIZE, video_size=SIZE)
-    record(TASK, "expert", 1000, arguments.work / "recorded" / "expert", pictures)
-    record(TASK, "random", 200, arguments.work / "recorded" / "random", pictures)
+    task = arguments.task
+    pictures = PictureConfig(agent_size=SIZES[task], video_size=SIZES[task])
+    record(task, "expert", 1000, arguments.work / "recorded" / "expert", pictures)
+    record(task, "random", 200, arguments.work / "recorded" / "random", pictures)
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True
     )
@@ -173,22 +189,12 @@ def main() -> None:
                 continue
             out = arguments.work / "runs" / f"{videos}_{kind}_{matched}_{seed}"
             shutil.rmtree(out, ignore_errors=True)
-            demos = demos_of(arguments.work, videos, kind, matched)
-            words = [
-                "train",
-                "--task",
-                TASK,
-                "--preset",
-                "drawn_pixels",
-                "--demos",
-                str(demos),
-                "--out",
-                str(out),
-            ]
-            words += ["--seed", str(seed), "--threads", "1", "--interactive.reward-updates-until", "0"]
+            demos = demos_of(task, arguments.work, videos, kind, matched)
+            words = ["train", "--task", task, "--demos", str(demos), "--out", str(out)]
+            words += ["--seed", str(seed), "--threads", "1", *OPTIONS[task]]
             if bootifol(words) != 0:
                 raise SystemExit(1)
-            rows = list(read_run(out).evaluations_of(60).values())[-1]
+            rows = list(read_run(out).evaluations_of(task_named(task).evaluation_steps).values())[-1]
             summary = summarize([row.scaled_return for row in rows if row.scaled_return is not None])
             low, high = summary.interval or (summary.mean, summary.mean)
             values = (videos, kind, matched, seed, f"{summary.mean:.3f}", f"{low:.3f}", f"{high:.3f}")
