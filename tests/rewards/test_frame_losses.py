@@ -95,3 +95,4 @@ def test_the_agents_frames_lose_only_what_they_show_more_often_than_the_expert(
 def test_rewards_are_cut_logits() -> None:
     logits = torch.tensor([-20.0, 0.0, 2.5, 20.0])
     assert losses.reward(logits).tolist() == [-1.0, 0.0, 0.5, 1.0]
+    assert losses.reward(logits, 0.0).tolist() == [0.0, 0.0, 0.5, 1.0]

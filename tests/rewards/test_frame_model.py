@@ -143,6 +143,13 @@ def test_it_goes_on_bit_for_bit_from_what_it_stored(exchange_weight: float) -> N
         assert np.array_equal(array, rest.state()[name]), name
 
 
+@pytest.mark.parametrize("random_fraction", [0.0, 1.0])
+def test_random_frames_are_any_fraction(random_fraction: float) -> None:
+    model = aligned(2, replace(SMALL, random_fraction=random_fraction))
+    metrics = model.update(EXPERT, agents_videos(model, OTHER))
+    assert all(np.isfinite(value) for value in metrics.values())
+
+
 def test_the_global_random_state_is_left_alone() -> None:
     torch.manual_seed(3)
     expected = torch.randn(2)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field, Strict
 
 from bootifol.settings import AtLeastTwo, Count, Fraction, Number, Positive, settings
 
@@ -66,12 +69,12 @@ class FrameConfig:
     moments: AtLeastTwo = 3
     """Moments of each of them in it; of each, a frame and one next to it."""
 
-    frames_per_class: Count = 96
+    frames_per_class: AtLeastTwo = 96
     """Frames of either class in a gradient step of the Interactive Phase."""
 
     random_fraction: Fraction = 0.33
     """Fraction of random videos among the frames that are not the expert's in the Interactive Phase; the rest is the
-    agent's."""
+    agent's. There is one of these at least."""
 
     width: Count = 16
     """Features of a cell of the eyes' map."""
@@ -80,6 +83,10 @@ class FrameConfig:
     """Standard deviation of the noise on the states (of variance about 1) that the head learns from in the Interactive
     Phase. Less of it, and the head tells the agent's successes from the expert's by how they differ in detail, and
     takes their reward away; more, and it rewards near misses."""
+
+    floor: Annotated[float, Strict(), Field(ge=-1, le=0)] = -1.0
+    """b: the least that a frame can get. With 0 all that looks more like a failure than like the expert is worth the
+    same, nothing: less to follow, and no second best to settle for."""
 
     learning_rate: Positive = 1e-3
     """Of Adam in the Alignment Phase."""

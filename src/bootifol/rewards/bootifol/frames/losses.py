@@ -19,11 +19,12 @@ def frame_loss(expert: torch.Tensor, other: torch.Tensor, lateness: torch.Tensor
 
     Args:
         expert: logits `[N]` of the expert's frames.
-        other: logits `[M]` of random videos' or the agent's.
+        other: logits `[M]` of random videos; without any, the expert's frames alone count.
         lateness: w `[N]` of the expert's frames, in [0, 1].
     """
     bce = F.binary_cross_entropy_with_logits
-    return (bce(expert.float(), lateness) + F.softplus(other.float()).mean()) / 2
+    of_others = F.softplus(other.float()).mean() if len(other) else 0.0
+    return (bce(expert.float(), lateness) + of_others) / 2
 
 
 def lateness(frame: torch.Tensor, frames: int, late_from: float) -> torch.Tensor:
@@ -118,10 +119,11 @@ def contrast(anchors: torch.Tensor, positives: torch.Tensor, temperature: float)
     return torch.stack(ways).mean()
 
 
-def reward(logits: torch.Tensor) -> torch.Tensor:
-    """What a frame gets: `x / 5`, cut at -1 and 1, float32 of the logits' shape. It still rises where the head is sure.
+def reward(logits: torch.Tensor, floor: float = -1.0) -> torch.Tensor:
+    """What a frame gets: `x / 5`, cut at b and 1, float32 of the logits' shape. It still rises where the head is sure.
 
     Args:
         logits: x.
+        floor: b, in [-1, 0].
     """
-    return (logits.float() / 5).clamp(-1.0, 1.0)
+    return (logits.float() / 5).clamp(floor, 1.0)

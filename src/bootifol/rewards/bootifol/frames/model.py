@@ -84,7 +84,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
             self._expert = self._some_states(expert, EXPERT_FRAMES)
         random = self._random_states()
         count = self.config.frames_per_class
-        of_random = round(self.config.random_fraction * count) if len(random) else 0
+        of_random = min(round(self.config.random_fraction * count), count - 1) if len(random) else 0
         videos = agent.sample_features(count - of_random, self._rng)
         rows = np.arange(len(videos))
         of_agent = videos[rows, self._rng.integers(videos.shape[1], size=len(videos))]
@@ -132,7 +132,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         """Rewards float32 `[N]` of frames by their states int8 `[N, Z]`."""
         with self._evaluating():
             logits = self.networks.logits(as_features(self._on_device(states)))
-            return to_host(losses.reward(logits))
+            return to_host(losses.reward(logits, self.config.floor))
 
     def states(self, frames: Frames) -> FrameStates:
         """What the eyes make of frames uint8 `[N, S, S, 3]`: int8 `[N, Z]`."""
