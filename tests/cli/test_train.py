@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from bootifol import api
+from bootifol.cli.help_texts import field_texts
 from bootifol.cli.main import main
 from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.demos.record import record
 from bootifol.envs.pictures import PictureConfig
 from bootifol.presets import CPU, SMOKE
+from bootifol.rewards.gaifo.config import GaifoConfig
 from bootifol.training.overrides import field_kinds
 
 EIGHT = PictureConfig(agent_size=8, video_size=8)
@@ -239,3 +241,9 @@ def test_the_short_help_fits_a_screen_and_the_whole_has_every_field(
         if "." in name and not is_dataclass(field_kinds()[name]):
             assert f"--{name.replace('_', '-')} " in shown["--help-all"]
     assert "(default: drawn)" in shown["--help"]
+
+
+def test_texts_of_inherited_fields_are_found() -> None:
+    texts = field_texts(GaifoConfig)
+    assert texts["precision"].endswith("stay in float32.") and "\n" not in texts["precision"]
+    assert texts["stacks_per_video"].startswith("Stacks drawn from each")

@@ -34,8 +34,9 @@ def _join_lines_of_fields(kind: type) -> None:
 
 
 def field_texts(kind: type) -> dict[str, str]:
-    """What stands below each field of a dataclass, on one line."""
-    found = docstring_parser.parse_from_object(kind).params
+    """What stands below each field of a dataclass and of those that it extends, on one line."""
+    kinds = [base for base in reversed(kind.__mro__) if dataclasses.is_dataclass(base)]
+    found = [field for base in kinds for field in docstring_parser.parse_from_object(base).params]
     return {field.arg_name: " ".join((field.description or "").split()) for field in found}
 
 
