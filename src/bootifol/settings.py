@@ -6,16 +6,17 @@ from __future__ import annotations
 import functools
 import typing
 from collections.abc import Callable
-from typing import Annotated, Any, TypeVar, cast
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from bootifol.errors import LARGEST_COUNT, MOST_THREADS, BootifolError, shortened
+from bootifol.errors import LARGEST_COUNT, LARGEST_SEED, MOST_THREADS, BootifolError, shortened
 
 Count = Annotated[int, Strict(), Field(ge=1, le=LARGEST_COUNT)]
 CountOrZero = Annotated[int, Strict(), Field(ge=0, le=LARGEST_COUNT)]
 AtLeastTwo = Annotated[int, Strict(), Field(ge=2, le=LARGEST_COUNT)]
+Seed = Annotated[int, Strict(), Field(ge=0, le=LARGEST_SEED)]
 Threads = Annotated[int, Strict(), Field(ge=1, le=MOST_THREADS)]
 Flag = Annotated[bool, Strict()]
 Number = Annotated[float, Strict(), Field(ge=0, le=LARGEST_COUNT, allow_inf_nan=False)]
@@ -23,6 +24,8 @@ Number = Annotated[float, Strict(), Field(ge=0, le=LARGEST_COUNT, allow_inf_nan=
 Positive = Annotated[float, Strict(), Field(gt=0, le=LARGEST_COUNT, allow_inf_nan=False)]
 Fraction = Annotated[float, Strict(), Field(ge=0, le=1, allow_inf_nan=False)]
 BelowOne = Annotated[float, Strict(), Field(ge=0, lt=1, allow_inf_nan=False)]
+
+Precision = Literal["fp32", "bf16"]
 
 _Kind = TypeVar("_Kind")
 

@@ -159,3 +159,9 @@ def test_whatever_a_file_says_is_read_or_refused(tmp_path: Path, data: dict[str,
         overridden(ENDS_SOON, read_config_file(path).fields, str(path))
     except BootifolError as error:
         assert str(path) in str(error)
+
+
+def test_a_seed_may_be_as_large_as_a_runs(tmp_path: Path) -> None:
+    assert read_config_file(written(tmp_path, f"seed: {2**63 - 1}")).seed == 2**63 - 1
+    with pytest.raises(BootifolError, match="seed must be at least 0, not -1"):
+        read_config_file(written(tmp_path, "seed: -1"))

@@ -5,9 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from bootifol.settings import BelowOne, Count, CountOrZero, Flag, Fraction, Number, Positive, settings
+from bootifol.settings import (
+    BelowOne,
+    Count,
+    CountOrZero,
+    Flag,
+    Fraction,
+    Number,
+    Positive,
+    Precision,
+    settings,
+)
 
-Precision = Literal["bf16", "fp32"]
 EncoderName = Literal["paper", "strided", "coarse"]
 Observations = Literal["pictures", "encodings", "states"]
 

@@ -11,10 +11,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from bootifol.agents.config import EncoderName, Precision
+from bootifol.agents.config import EncoderName
 from bootifol.agents.networks import Encoder, StateEncoder
 from bootifol.devices import to_device, to_host
 from bootifol.optim import load_module_state, module_state, take_step
+from bootifol.settings import Precision
 from bootifol.types import Arrays, Batch, Frames, FrameStates, StepMetrics
 
 

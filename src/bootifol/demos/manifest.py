@@ -11,9 +11,9 @@ from typing import Annotated, Any
 
 from pydantic import Field, Strict
 
-from bootifol.errors import LARGEST_SEED, BootifolError, shortened
+from bootifol.errors import BootifolError, shortened
 from bootifol.files import read_json, write_json
-from bootifol.settings import AtLeastTwo, Count, CountOrZero, Flag, Positive, as_settings
+from bootifol.settings import AtLeastTwo, Count, CountOrZero, Flag, Positive, Seed, as_settings
 
 FORMAT = 1
 MANIFEST_NAME = "manifest.json"
@@ -90,7 +90,7 @@ class Manifest:
     """Name in the catalogue of tasks; None for imported videos."""
     behavior: str
     """Who performs: expert, half_good, random, still."""
-    seed: Annotated[int, Strict(), Field(ge=0, le=LARGEST_SEED)] | None
+    seed: Seed | None
     """The seed all videos' seeds derive from; None for imported videos."""
     episodes: Count
     """Videos the complete set has."""

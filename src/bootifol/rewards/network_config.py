@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, Strict
 
-from bootifol.settings import Positive
-
-Precision = Literal["fp32", "bf16"]
+from bootifol.settings import Positive, Precision
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import yaml
 
 from bootifol.errors import BootifolError, shortened
 from bootifol.files import parsed_json, require_file
-from bootifol.settings import CountOrZero, settings
+from bootifol.settings import Seed, settings
 from bootifol.training.budget import parse_duration
 from bootifol.training.config import TrainingConfig
 from bootifol.training.overrides import field_kinds, nearest, overridden
@@ -38,7 +38,7 @@ class ConfigFile:
     task: str | None = None
     method: str | None = None
     preset: str | None = None
-    seed: CountOrZero | None = None
+    seed: Seed | None = None
     time_budget: str | None = None
     """As it is typed, such as 90m."""
     demos: str | None = None

@@ -6,16 +6,14 @@ import dataclasses
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
-
-from pydantic import Field, Strict
+from typing import Any
 
 from bootifol.checksums import is_as_written
-from bootifol.errors import LARGEST_SEED, BootifolError, shortened
+from bootifol.errors import BootifolError, shortened
 from bootifol.files import read_json, write_json
 from bootifol.old_names import with_todays_names
 from bootifol.plugins import require_trust
-from bootifol.settings import Number, as_settings, settings
+from bootifol.settings import Number, Seed, as_settings, settings
 from bootifol.tasks import Task, task_named
 from bootifol.training.config import TrainingConfig
 from bootifol.training.provenance import versions, videos_in
@@ -33,7 +31,7 @@ class RunConfig:
     task: str
     method: str
     preset: str
-    seed: Annotated[int, Strict(), Field(ge=0, le=LARGEST_SEED)]
+    seed: Seed
     demos: str
     """Directory of the demo sets."""
     time_budget: Number | None

@@ -17,8 +17,8 @@ def siamese_loss(
 
     With h, the encodings of sequences, it is L_SNS; with e, those of frames (averaged over time, Eq. 4), L_SNI.
 
-    `d` is `||a - b||`. Differs from the release in that, there the mean square over the dimensions, which near zero
-    hardly has a gradient, and in that the margin is that of each anchor, not of the batch's mean distance.
+    `d` is `||a - b||`. In the release it is the mean square over the dimensions, which near zero hardly has a gradient,
+    and the margin is that of the batch's mean distance, here of each anchor.
 
     Args:
         anchor: f_i `[..., D]`.
