@@ -22,6 +22,7 @@ from rich.console import Console
 
 from benchmarks.command import command
 from bootifol.demos.demo_set import DemoSet, VideoSubset
+from bootifol.demos.fit import look_alike
 from bootifol.demos.manifest import find_demo_sets
 from bootifol.errors import BootifolError
 from bootifol.evaluation.sight import Performance, against_kinds, failures, perform, returns, sight
@@ -35,7 +36,7 @@ from bootifol.rewards.base import RewardModel
 from bootifol.rewards.references import draw_references
 from bootifol.rewards.registry import make_reward_model
 from bootifol.tasks import make_environment, task_named
-from bootifol.types import Metrics, Rewards, Video
+from bootifol.types import Metrics, OtherCamera, Rewards, Video, VideoSource
 
 HEADER = ("task", "reward", "videos", "measure", "value")
 REWARDS = ("bootifol", "sequences", "gaifo", "virl", "context_translation")
@@ -52,10 +53,13 @@ def aligned(
     paths = find_demo_sets(demos)
     sets = [DemoSet.open(paths[kind], verify=False) for kind in ("expert", "random")]
     expert, other = (VideoSubset(demo_set, range(min(videos, len(demo_set)))) for demo_set in sets)
+    others: VideoSource = other
+    if reward == "bootifol" and not look_alike(*(demo_set.manifest for demo_set in sets)):
+        others = OtherCamera(other)
     steps = config.alignment.gradient_steps
     # ViRL learns nothing before the agent acts; here it learns from the same videos for as long.
     metrics = (
-        model.align(expert, other) if method != "virl" else iter(lambda: model.update(expert, other), None)
+        model.align(expert, others) if method != "virl" else iter(lambda: model.update(expert, other), None)
     )
     end = time.monotonic() + 60 * minutes
     with progress(f"aligning {reward} ({preset_name})", steps) as advance:

@@ -142,6 +142,24 @@ class VideoSource(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class OtherCamera:
+    """Videos, as a `VideoSource`, that look otherwise than the expert's whatever they show: those come from files, and
+    are told from these by their compression."""
+
+    videos: VideoSource
+
+    def __len__(self) -> int:
+        return len(self.videos)
+
+    def __getitem__(self, index: int) -> Video:
+        return self.videos[index]
+
+    def sample(self, count: int, rng: np.random.Generator) -> FrameBatch:
+        """As the source's."""
+        return self.videos.sample(count, rng)
+
+
 @runtime_checkable
 class FeatureSource(VideoSource, Protocol):
     """Videos to draw from whose features were computed once."""

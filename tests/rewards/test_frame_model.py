@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -10,10 +11,11 @@ import torch
 from numpy.typing import NDArray
 
 from bootifol.errors import BootifolError
+from bootifol.evaluation.ranking import area_under_curve
 from bootifol.replay.agent_videos import AgentVideos
 from bootifol.rewards.bootifol.frames.config import FrameConfig
 from bootifol.rewards.bootifol.frames.model import FrameRewardModel
-from bootifol.types import FrameBatch, Video
+from bootifol.types import FrameBatch, OtherCamera, Video
 
 SIZE, FRAMES = 32, 12
 SMALL = FrameConfig(videos_per_class=8, frames_per_class=32, width=8)
@@ -128,6 +130,49 @@ def test_a_v_that_goes_with_another_u_loses() -> None:
     u, v = np.split(last, 2, axis=1)
     right, wrong = model.score(last), model.score(np.concatenate([np.roll(u, 1, 0), v], axis=1))
     assert np.mean(right[:, None] > wrong[None]) > 0.82
+
+
+def test_the_experts_videos_alone_teach_it() -> None:
+    model = FrameRewardModel(SMALL, SIZE, 1)
+    losses = list(islice(model.align(EXPERT, OtherCamera(OTHER)), 60))
+    assert set(losses[0]) == {"loss/frame", "loss/episode", "loss/time", "loss/exchange", "loss/total"}
+    reached, missed = (
+        np.concatenate([model.label(videos[index])[7:] for index in range(len(videos))])
+        for videos in (EXPERT, OTHER)
+    )
+    assert area_under_curve(reached, missed) > 0.9
+
+
+class Filmed(Reaches):
+    """The same videos with a bright edge, as another camera shows them."""
+
+    def __init__(self, videos: Reaches) -> None:
+        self.name, self.videos = f"{videos.name}-filmed", videos.videos.copy()
+        self.videos[:, :, :, :2] += 90
+
+
+def test_what_another_camera_adds_is_taken_away() -> None:
+    model = FrameRewardModel(SMALL, SIZE, 1)
+    filmed = Filmed(EXPERT)
+    same_starts = Reaches("others", False)
+    list(islice(model.align(filmed, OtherCamera(same_starts)), 30))
+    clean, shown = (
+        np.concatenate([model.states(videos[index].frames) for index in range(len(videos))])
+        for videos in (EXPERT, filmed)
+    )
+    moved = model._as_the_agent_sees(shown)
+    off, left = (np.abs(states.mean(0) - clean.mean(0)).sum() for states in (shown, moved))
+    assert left < off / 2
+    again = FrameRewardModel(SMALL, SIZE, 1)
+    again.load_state(model.state())
+    assert np.array_equal(again._as_the_agent_sees(shown), moved), "it is part of a checkpoint"
+
+
+def test_the_experts_alone_go_on_against_the_agent() -> None:
+    model = FrameRewardModel(SMALL, SIZE, 1)
+    next(model.align(EXPERT, OtherCamera(OTHER)))
+    metrics = model.update(EXPERT, agents_videos(model, Reaches("hole", False, 8, seed=11)))
+    assert set(metrics) == {"loss/frame", "loss/exchange", "loss/bootstrap", "loss/total"}
 
 
 @pytest.mark.parametrize("exchange_weight", [0.0, 1.0])

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from tiny_runs import SEEING, TINY, new_run
 
+from bootifol.demos.export_videos import export_videos
+from bootifol.demos.import_videos import Conversion, import_videos
 from bootifol.errors import BootifolError
 from bootifol.evaluation.tables import read_ranking
 from bootifol.rewards.config import RewardConfig
-from bootifol.types import Video
+from bootifol.types import OtherCamera, Video
 
 
 def contents(videos: list[Video]) -> tuple[set[str], set[bytes]]:
@@ -52,3 +55,25 @@ def test_episodes_longer_than_the_videos_want_a_reward_of_single_frames(tmp_path
     assert (ranked.kind, ranked.video) == ("agent", newest.name)
     of_first = run.parts.reward_model.label(newest, ())[:30]
     assert ranked.reward == pytest.approx(of_first.sum(), rel=1e-6), "of as many steps as the videos have"
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_single_frames_of_files_are_not_held_against_recorded_ones(
+    tmp_path: Path, demos: Path, both: bool
+) -> None:
+    mine = tmp_path / "mine"
+    for behavior in ("expert", "random"):
+        if behavior == "expert" or both:
+            export_videos(demos, tmp_path / behavior, behavior=behavior)
+            import_videos([tmp_path / behavior], mine / behavior, Conversion(31, 32), behavior)
+        else:
+            shutil.copytree(demos / behavior, mine / behavior)
+    run = new_run(tmp_path / "run", mine, config=SEEING)
+    demos_of_run = run.parts.demos
+    assert demos_of_run.imported
+    assert isinstance(demos_of_run.random, OtherCamera) is not both
+    assert run.learn()
+    # Where all videos are from files, nothing says how the agent's pictures differ from them.
+    assert (run.counters.reward_updates > 0) is not both
+    paper = new_run(tmp_path / "paper", mine).parts.demos
+    assert not isinstance(paper.random, OtherCamera), "sequences are compared with looks that vary"

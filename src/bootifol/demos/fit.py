@@ -29,6 +29,12 @@ def differences(manifest: Manifest, task: Task, pictures: PictureConfig | None =
     return found + (_differences_of_pictures(manifest, pictures) if pictures is not None else [])
 
 
+def look_alike(expert: Manifest, other: Manifest) -> bool:
+    """Whether both sets come from files, or both from the simulator. A single frame of a file is told from the
+    simulator's own by its compression, and then by nothing else."""
+    return (expert.conversion is None) == (other.conversion is None)
+
+
 def _differences_of_recorded(manifest: Manifest, task: Task) -> list[str]:
     found = []
     if manifest.action_repeat != task.action_repeat:

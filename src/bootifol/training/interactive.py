@@ -23,7 +23,7 @@ from bootifol.training.build import Parts
 from bootifol.training.cloning import cloning_due
 from bootifol.training.config import InteractiveConfig
 from bootifol.training.interruption import Interruption
-from bootifol.types import Action, Arrays, Batch, Observation, StepMetrics
+from bootifol.types import Action, Arrays, Batch, Observation, OtherCamera, StepMetrics
 
 RELABEL_EVERY = 100
 """Where replay keeps states: updates of the reward after which every stored step is rewarded anew, which takes a
@@ -72,9 +72,13 @@ class InteractivePhase:
         """The same as the reward learns from them, in looks that vary like the expert's."""
         self.replay = parts.replay
         self.reward_model = parts.reward_model
-        # Videos from files: the head would learn to tell their compression from the agent's clean pictures, and its
-        # eyes, which saw them in many looks, rest already.
-        self.reward_rests = parts.demos.augmented and isinstance(parts.reward_model, SeesFrames)
+        # All videos from files: a head would learn to tell their compression from the agent's clean pictures, and
+        # nothing says what it adds to them.
+        self.reward_rests = (
+            parts.demos.imported
+            and not isinstance(parts.demos.random, OtherCamera)
+            and isinstance(parts.reward_model, SeesFrames)
+        )
         self.featurizer = parts.featurizer
         self.agent = parts.agent
         self.demonstrations = parts.demonstrations

@@ -10,7 +10,7 @@ from rich.console import Console
 from bootifol.demos.augmentation import augmented
 from bootifol.demos.demo_set import DemoSet
 from bootifol.demos.features import FeaturizedVideos, without_pixels
-from bootifol.demos.fit import differences
+from bootifol.demos.fit import differences, look_alike
 from bootifol.demos.manifest import find_demo_sets, read_manifest
 from bootifol.demos.record import record
 from bootifol.demos.verification import Verification
@@ -19,7 +19,7 @@ from bootifol.evaluation.ranking import KINDS
 from bootifol.networks.backbones import Backbone
 from bootifol.tasks import Task
 from bootifol.training.run_config import RunConfig
-from bootifol.types import Video, VideoSource
+from bootifol.types import OtherCamera, Video, VideoSource
 
 _VERIFY_BELOW_BYTES = 1_000_000_000
 
@@ -36,6 +36,8 @@ class Demos:
     """Videos by kind that the reward never learns from, to see whether it ranks them right."""
     augmented: bool = False
     """Whether samples of `expert` and `random` vary in looks; the agent's videos then do, too."""
+    imported: bool = False
+    """Whether the expert videos come from files."""
     verification: Verification = field(default_factory=Verification)
     """Of the sets that were too large to be verified on opening."""
 
@@ -95,7 +97,13 @@ def open_demos(run: RunConfig, task: Task, backbone: Backbone | None, console: C
         featurized_aside = FeaturizedVideos(aside, backbone)
         kept[kind] = without_pixels(featurized_aside[index] for index in range(len(aside)))
     imported = expert.manifest.conversion is not None
-    varied = backbone is None and training.augmentation.applies(imported)
+    if not (compares_in_time(run) or look_alike(expert.manifest, read_manifest(paths["random"]))):
+        sources["random"] = OtherCamera(sources["random"])
+        console.print(
+            "the eyes learn from the expert's videos alone: others look otherwise, whatever they show"
+        )
+    other_camera = isinstance(sources["random"], OtherCamera)
+    varied = backbone is None and training.augmentation.applies(imported) and not other_camera
     if varied:
         console.print("the reward learns from videos of varying looks (augmentation)")
     return Demos(
@@ -103,6 +111,7 @@ def open_demos(run: RunConfig, task: Task, backbone: Backbone | None, console: C
         augmented(sources["random"], varied),
         kept if held_out else {},
         varied,
+        imported,
         Verification(unverified),
     )
 

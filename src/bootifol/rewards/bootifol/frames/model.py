@@ -22,7 +22,17 @@ from bootifol.rewards.bootifol.frames import losses
 from bootifol.rewards.bootifol.frames.config import FrameConfig
 from bootifol.rewards.bootifol.frames.networks import FrameNetworks
 from bootifol.rewards.learned import LearnedRewardModel
-from bootifol.types import Arrays, FeatureSource, Frames, FrameStates, Metrics, Rewards, Video, VideoSource
+from bootifol.types import (
+    Arrays,
+    FeatureSource,
+    Frames,
+    FrameStates,
+    Metrics,
+    OtherCamera,
+    Rewards,
+    Video,
+    VideoSource,
+)
 
 NEXT_TO = 2
 """Farthest frame, in agent steps, that counts as next to another, as in L_triplet."""
@@ -32,6 +42,9 @@ RANDOM_FRAMES = 4096
 
 EXPERT_FRAMES = 100_000
 """Most frames of the expert's that are kept so."""
+
+EXCHANGE_ALONE = 0.5
+"""Least w_X where the eyes learn from the expert's videos alone: exchanged halves are all that shows them a failure."""
 
 SHIFT = 2
 """Largest random shift of the pictures, in pixels, while the eyes learn."""
@@ -53,7 +66,9 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
 
     def __init__(self, config: FrameConfig, video_size: int, seed: int, device: str = "cpu") -> None:
         super().__init__(FrameNetworks, config, video_size, seed, device)
+        self._expert_videos: VideoSource | None = None
         self._other: VideoSource | None = None
+        self._offset: NDArray[np.float32] | None = None
         self._random: FrameStates | None = None
         self._expert: FrameStates | None = None
 
@@ -65,9 +80,10 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
     def align(self, expert: VideoSource, other: VideoSource) -> Iterator[Metrics]:
         """Alignment Phase: eyes and head learn from the expert's and random videos.
 
-        L = w_F L_F + w_E L_E + w_T L_T + w_X L_X.
+        L = w_F L_F + w_E L_E + w_T L_T + w_X L_X. Where the other videos are of an `OtherCamera`, the expert's alone
+        teach: L_F tells late frames from early ones, and L_X, of weight 0.5 unless more is asked for, makes failures.
         """
-        self._other = other
+        self._expert_videos, self._other = expert, other
         while True:
             yield self._align_step(expert, other)
 
@@ -81,7 +97,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         if not isinstance(agent, FeatureSource):
             raise BootifolError("the reward from single frames learns from the states of the agent's videos")
         if self._expert is None:
-            self._expert = self._some_states(expert, EXPERT_FRAMES)
+            self._expert = self._as_the_agent_sees(self._some_states(expert, EXPERT_FRAMES))
         random = self._random_states()
         count = self.config.frames_per_class
         of_random = min(round(self.config.random_fraction * count), count - 1) if len(random) else 0
@@ -95,7 +111,8 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
             of_agent,
             random[self._rng.integers(max(len(random), 1), size=of_random)],
         ]
-        if self.config.exchange_weight > 0:
+        exchange_weight = self._exchange_weight(bool(self._offset_of_looks().any()))
+        if exchange_weight > 0:
             moments = self._rng.integers(of_each, size=count)
             states.append(self._expert[of_expert - of_expert % of_each + moments])
         features = as_features(self._on_device(np.concatenate(states)))
@@ -112,10 +129,10 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         bootstrap = losses.bootstrap_loss(logits(agent_states))
         total = frame + self.config.agent_weight * bootstrap
         terms = {"loss/frame": frame, "loss/bootstrap": bootstrap}
-        if self.config.exchange_weight > 0:
+        if exchange_weight > 0:
             same, mixed = losses.exchanged(expert_states, another, random_states)
             terms["loss/exchange"] = losses.exchange_loss(logits(same), lateness, logits(mixed))
-            total = total + self.config.exchange_weight * terms["loss/exchange"]
+            total = total + exchange_weight * terms["loss/exchange"]
         metrics = step.take(total, terms)
         self.version += 1
         return metrics
@@ -149,13 +166,17 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         return self.states(video.frames)
 
     def state(self) -> Arrays:
-        """What every reward model has, and the states of random frames that `update` learns from."""
-        return {**super().state(), "random_states": self._random_states()}
+        """What every reward model has, the states of random frames that `update` learns from, and what another camera
+        adds to the expert's."""
+        random, offset = self._random_states(), self._offset_of_looks()
+        return {**super().state(), "random_states": random, "offset_of_looks": offset}
 
     def load_state(self, arrays: Arrays) -> None:
         """The inverse of `state`."""
         super().load_state(arrays)
         self._random = arrays["random_states"].astype(np.int8)
+        # A run of older code has none.
+        self._offset = arrays.get("offset_of_looks", np.zeros(STATE_SIZE)).astype(np.float32)
         self._expert = None
 
     def _random_states(self) -> FrameStates:
@@ -183,9 +204,16 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
 
     def _align_step(self, expert: VideoSource, other: VideoSource) -> Metrics:
         config = self.config
-        videos = [self._sample(source, config.videos_per_class) for source in (expert, other)]
+        alone = isinstance(other, OtherCamera)
+        count = config.videos_per_class
+        counts = [2 * count, 0] if alone else [count, count]
+        videos = [
+            self._sample(source, of_class)
+            for source, of_class in zip((expert, other), counts, strict=True)
+            if of_class
+        ]
         length = min(of_class.shape[1] for of_class in videos)
-        times = self._draw_times(2 * config.videos_per_class, length)
+        times = self._draw_times(sum(counts), length)
         frames = np.stack(
             [video[at] for video, at in zip([v for of_class in videos for v in of_class], times, strict=True)]
         )
@@ -196,26 +224,52 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         # As coarse as the states that will be kept.
         states = (seen + rounding(seen, self._rng)).unflatten(0, (len(frames), config.moments, 2))
         of_episode, of_time = self.networks.views(states)
-        expert_logits, other_logits = self.networks.logits(states).chunk(2)
-        of_expert = times[: config.videos_per_class].reshape(-1, config.moments, 2)
+        expert_logits, other_logits = torch.split(self.networks.logits(states), counts)
+        of_expert = times[: counts[0]].reshape(-1, config.moments, 2)
         lateness = losses.lateness(self._on_device(of_expert), videos[0].shape[1], config.late_from)
+        weights = {"frame": config.frame_weight, "episode": config.episode_weight, "time": config.time_weight}
         terms = {"frame": losses.frame_loss(expert_logits, other_logits, lateness)}
         if config.episode_weight > 0:
             moments = of_episode[:, :, 0].transpose(0, 1)
             terms["episode"] = losses.contrast(moments, moments.roll(1, 0), config.temperature)
         if config.time_weight > 0:
             terms["time"] = losses.contrast(of_time[:, :, 0], of_time[:, :, 1], config.temperature)
-        if config.exchange_weight > 0:
-            of_expert_videos, of_random_videos = states.chunk(2)
+        weights["exchange"] = self._exchange_weight(alone)
+        if weights["exchange"] > 0:
+            of_expert_videos, of_random_videos = torch.split(states, counts)
             another = of_expert_videos.roll(1, 1)
             same, mixed = losses.exchanged(of_expert_videos, another, of_random_videos)
             logits = self.networks.logits
             terms["exchange"] = losses.exchange_loss(logits(same), lateness, logits(mixed))
-        total = torch.stack([getattr(config, f"{name}_weight") * term for name, term in terms.items()]).sum()
+        total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
         metrics = step.take(total, {f"loss/{name}": term for name, term in terms.items()})
         self.version += 1
-        self._expert = self._random = None
+        self._expert = self._random = self._offset = None
         return metrics
+
+    def _exchange_weight(self, alone: bool) -> float:
+        """w_X, by whether the eyes learn from the expert's videos alone."""
+        return max(self.config.exchange_weight, EXCHANGE_ALONE) if alone else self.config.exchange_weight
+
+    def _offset_of_looks(self) -> NDArray[np.float32]:
+        """`[Z]`: what another camera adds to the states of the expert's frames. 0 where there is none.
+
+        Everybody begins alike, so first frames differ by their looks alone.
+        """
+        if self._offset is None:
+            self._offset = np.zeros(STATE_SIZE, np.float32)
+            if isinstance(self._other, OtherCamera) and self._expert_videos is not None:
+                of_expert, of_others = (
+                    self.states(np.stack([videos[index].frames[0] for index in range(len(videos))])).mean(0)
+                    for videos in (self._expert_videos, self._other)
+                )
+                self._offset = (of_expert - of_others).astype(np.float32)
+        return self._offset
+
+    def _as_the_agent_sees(self, states: FrameStates) -> FrameStates:
+        """States `[N, Z]` of the expert's frames without what another camera adds to them."""
+        moved: FrameStates = np.rint(states - self._offset_of_looks()).clip(-127, 127).astype(np.int8)
+        return moved
 
     def _draw_times(self, videos: int, length: int) -> NDArray[np.int64]:
         """Frames `[videos, 2 * moments]` of each video: a moment, a frame next to it, the next moment, and so on."""
