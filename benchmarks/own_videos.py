@@ -5,7 +5,8 @@
         --figure docs/images/own_videos.png
 
 A task's expert videos are enlarged, disturbed as a camera would, written as mp4 files, imported, matched where the row
-says so, and learned from; on `drawn_home` with the reward at rest after alignment. Each row of OUT.csv is one run; rows that are there are not run again.
+says so, and learned from; on `drawn_home` with the reward at rest after alignment. Each row of OUT.csv is one run; rows
+that are there are not run again.
 
 - jitter: a hand that trembles by up to 3 % of the picture.
 - exposure: brightness that drifts by 15 % within a video, and a white balance of its own.
