@@ -37,7 +37,7 @@ class AugmentationConfig:
 
     when: Literal["never", "imported", "always"] = "never"
     """`imported`: where the expert videos come from files. The paper's are recorded and never vary. A pretrained
-    backbone, whose features are computed once, never sees them vary."""
+    backbone, whose features are computed once, never sees them vary, nor do eyes that learn from the expert's alone."""
 
     def applies(self, imported: bool) -> bool:
         """Whether looks vary in a run whose expert videos were imported, or recorded."""
