@@ -43,8 +43,9 @@ RANDOM_FRAMES = 4096
 EXPERT_FRAMES = 100_000
 """Most frames of the expert's that are kept so."""
 
-EXCHANGE_ALONE = 0.5
-"""Least w_X where the eyes learn from the expert's videos alone: exchanged halves are all that shows them a failure."""
+EXCHANGE_ALONE, LATE_FROM_ALONE = 0.5, 0.5
+"""Least w_X and c where the eyes learn from the expert's videos alone: exchanged halves and early frames are all that
+shows them a failure."""
 
 SHIFT = 2
 """Largest random shift of the pictures, in pixels, while the eyes learn."""
@@ -81,7 +82,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         """Alignment Phase: eyes and head learn from the expert's and random videos.
 
         L = w_F L_F + w_E L_E + w_T L_T + w_X L_X. Where the other videos are of an `OtherCamera`, the expert's alone
-        teach: L_F tells late frames from early ones, and L_X, of weight 0.5 unless more is asked for, makes failures.
+        teach: L_F tells late frames from early ones (c at least 0.5), and L_X, of weight 0.5 or more, makes failures.
         """
         self._expert_videos, self._other = expert, other
         while True:
@@ -111,7 +112,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
             of_agent,
             random[self._rng.integers(max(len(random), 1), size=of_random)],
         ]
-        exchange_weight = self._exchange_weight(bool(self._offset_of_looks().any()))
+        exchange_weight, late_from = self._failures_shown(alone=bool(self._offset_of_looks().any()))
         if exchange_weight > 0:
             moments = self._rng.integers(of_each, size=count)
             states.append(self._expert[of_expert - of_expert % of_each + moments])
@@ -124,7 +125,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         of_class = torch.tensor_split(features, (count, 2 * count - of_random, 2 * count))
         expert_states, agent_states, random_states, another = of_class
         logits = self.networks.logits
-        lateness = losses.lateness(self._on_device(of_expert % of_each), of_each, self.config.late_from)
+        lateness = losses.lateness(self._on_device(of_expert % of_each), of_each, late_from)
         frame = losses.frame_loss(logits(expert_states), logits(random_states), lateness)
         bootstrap = losses.bootstrap_loss(logits(agent_states))
         total = frame + self.config.agent_weight * bootstrap
@@ -205,6 +206,7 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
     def _align_step(self, expert: VideoSource, other: VideoSource) -> Metrics:
         config = self.config
         alone = isinstance(other, OtherCamera)
+        exchange_weight, late_from = self._failures_shown(alone)
         count = config.videos_per_class
         counts = [2 * count, 0] if alone else [count, count]
         videos = [
@@ -226,16 +228,20 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         of_episode, of_time = self.networks.views(states)
         expert_logits, other_logits = torch.split(self.networks.logits(states), counts)
         of_expert = times[: counts[0]].reshape(-1, config.moments, 2)
-        lateness = losses.lateness(self._on_device(of_expert), videos[0].shape[1], config.late_from)
-        weights = {"frame": config.frame_weight, "episode": config.episode_weight, "time": config.time_weight}
+        lateness = losses.lateness(self._on_device(of_expert), videos[0].shape[1], late_from)
+        weights = {
+            "frame": config.frame_weight,
+            "episode": config.episode_weight,
+            "time": config.time_weight,
+            "exchange": exchange_weight,
+        }
         terms = {"frame": losses.frame_loss(expert_logits, other_logits, lateness)}
         if config.episode_weight > 0:
             moments = of_episode[:, :, 0].transpose(0, 1)
             terms["episode"] = losses.contrast(moments, moments.roll(1, 0), config.temperature)
         if config.time_weight > 0:
             terms["time"] = losses.contrast(of_time[:, :, 0], of_time[:, :, 1], config.temperature)
-        weights["exchange"] = self._exchange_weight(alone)
-        if weights["exchange"] > 0:
+        if exchange_weight > 0:
             of_expert_videos, of_random_videos = torch.split(states, counts)
             another = of_expert_videos.roll(1, 1)
             same, mixed = losses.exchanged(of_expert_videos, another, of_random_videos)
@@ -247,9 +253,12 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         self._expert = self._random = self._offset = None
         return metrics
 
-    def _exchange_weight(self, alone: bool) -> float:
-        """w_X, by whether the eyes learn from the expert's videos alone."""
-        return max(self.config.exchange_weight, EXCHANGE_ALONE) if alone else self.config.exchange_weight
+    def _failures_shown(self, alone: bool) -> tuple[float, float]:
+        """w_X and c, by whether the eyes learn from the expert's videos alone."""
+        weight, late_from = self.config.exchange_weight, self.config.late_from
+        if not alone:
+            return weight, late_from
+        return max(weight, EXCHANGE_ALONE), max(late_from, LATE_FROM_ALONE)
 
     def _offset_of_looks(self) -> NDArray[np.float32]:
         """`[Z]`: what another camera adds to the states of the expert's frames. 0 where there is none.
