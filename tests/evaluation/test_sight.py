@@ -34,6 +34,8 @@ def test_an_expert_is_compared_with_episodes_that_failed() -> None:
     # Steps with reward: 3, 3, 2, 9, 9; without: 1, 2, 2, 0, 0, 0, 0; ties with the two 2s count half.
     assert figures["step_auc"] == pytest.approx((7 * 4 + 5 + 2 * 0.5) / 35)
     assert "50% of pairs at worst (weak)" in in_words(figures)
+    assert "does not see" in in_words(figures)
+    assert "reward sees" in in_words({**figures, "auc:weak": 0.9})
 
 
 def test_a_blind_reward_is_found_out_by_who_plays_smoothly() -> None:

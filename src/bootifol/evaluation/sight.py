@@ -19,6 +19,9 @@ from bootifol.experts import make_expert
 from bootifol.experts.failures import failures_of, make_failure
 from bootifol.types import Metrics, Rewards, Video
 
+SEES = 0.8
+"""Chance that the expert is rewarded above its worst kind of failure, below which the reward is not said to see."""
+
 FIRST_SEED = 10**6
 """Of each performer's episodes; all play the same starts."""
 
@@ -122,8 +125,9 @@ def in_words(figures: Metrics) -> str:
     on_target = (
         f", a step on the target above one off it {figures['step_auc']:.0%}" if "step_auc" in figures else ""
     )
+    verdict = "sees" if against[worst] >= SEES else "does not see the whole task"
     return (
-        f"the learned reward sees: expert above {len(against)} kinds of plausible failures, {against[worst]:.0%} of "
-        f"pairs at worst ({worst.replace('_', ' ')}){on_target}; Spearman with the true return "
+        f"the learned reward {verdict}: expert above {len(against)} kinds of plausible failures, {against[worst]:.0%} "
+        f"of pairs at worst ({worst.replace('_', ' ')}){on_target}; Spearman with the true return "
         f"{figures['spearman']:.2f}"
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from bootifol.errors import BootifolError
 from bootifol.evaluation.ranking import RankingScores, expert_above_random, ranking_scores
-from bootifol.evaluation.sight import against_kinds, in_words
+from bootifol.evaluation.sight import SEES, against_kinds, in_words
 from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import EvaluationRow, RankingRow
 from bootifol.reports.final_return import FinalReturn, final_return
@@ -156,7 +156,7 @@ def _sight(run: RunFiles) -> Finding | None:
         worst = min(first, key=first.__getitem__, default=None)
         if worst is not None:
             text += f"; before the agent acted it was {_percent(first[worst])} at worst ({worst.replace('_', ' ')})"
-    return Finding(_verdict(min(against.values()), good=0.95, fair=0.8), f"{text[0].upper()}{text[1:]}.")
+    return Finding(_verdict(min(against.values()), good=0.95, fair=SEES), f"{text[0].upper()}{text[1:]}.")
 
 
 def _order_of_videos(run: RunFiles) -> Finding | None:
