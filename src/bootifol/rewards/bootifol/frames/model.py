@@ -43,6 +43,9 @@ RANDOM_FRAMES = 4096
 EXPERT_FRAMES = 100_000
 """Most frames of the expert's that are kept so."""
 
+FIRST_FRAMES = 1000
+"""Most first frames of either class that say what another camera adds."""
+
 EXCHANGE_ALONE, LATE_FROM_ALONE = 0.5, 0.5
 """Least w_X and c where the eyes learn from the expert's videos alone: exchanged halves and early frames are all that
 shows them a failure."""
@@ -269,7 +272,9 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
             self._offset = np.zeros(STATE_SIZE, np.float32)
             if isinstance(self._other, OtherCamera) and self._expert_videos is not None:
                 of_expert, of_others = (
-                    self.states(np.stack([videos[index].frames[0] for index in range(len(videos))])).mean(0)
+                    self.states(
+                        np.stack([videos[i].frames[0] for i in range(min(len(videos), FIRST_FRAMES))])
+                    ).mean(0)
                     for videos in (self._expert_videos, self._other)
                 )
                 self._offset = (of_expert - of_others).astype(np.float32)
