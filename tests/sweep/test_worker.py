@@ -30,7 +30,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def plays(monkeypatch: pytest.MonkeyPatch, code: str) -> None:
     """Puts a program in place of `bootifol`; its words are in `sys.argv[1:]`."""
-    monkeypatch.setattr(worker, "PROGRAM", (sys.executable, "-c", f"import json, os, sys\n{code}"))
+    monkeypatch.setattr(worker, "PROGRAM", (sys.executable, "-c", f"import json, os, sys, time\n{code}"))
 
 
 def surroundings(cpus: int = 1, gpus: float = 0.0) -> Surroundings:
@@ -63,7 +63,7 @@ def test_a_run_with_a_gpu_has_the_one_that_ray_gave_it(monkeypatch: pytest.Monke
 def test_a_run_that_was_begun_is_resumed_and_its_place_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
     directory = Path("out/seed1")
     write_config(directory)
-    code = "import time\nwhile not os.path.exists('out/seed1.running'): time.sleep(0.01)\n"
+    code = "while not os.path.exists('out/seed1.running'): time.sleep(0.01)\n"
     plays(monkeypatch, code + "os.rename('out/seed1.running', 'seen.running')\nprint(sys.argv)")
     work_on(directory)
     place = Place.of(Path("seen"))
@@ -120,6 +120,25 @@ def test_a_run_that_is_asked_to_stop_writes_its_checkpoint(monkeypatch: pytest.M
     threading.Thread(target=ask).start()
     assert work_on(directory) == Ending(), "it did not fail"
     assert Path("checkpoint").exists() and run_state(directory).state == "begun"
+
+
+def test_a_run_that_is_asked_to_stop_twice_is_still_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    code = "open('begun', 'w')\nos.read(0, 1)\nopen('asked', 'w')\nwhile not os.path.exists('twice'): pass\n"
+    plays(monkeypatch, f"{code}time.sleep(0.5)\nopen('checkpoint', 'w')")
+
+    def ask_as(file: str) -> None:
+        while not Path(file).exists():
+            threading.Event().wait(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def ask_twice() -> None:
+        ask_as("begun")
+        ask_as("asked")
+        Path("twice").touch()
+
+    threading.Thread(target=ask_twice).start()
+    assert work_on(Path("out/seed1")) == Ending()
+    assert Path("checkpoint").exists()
 
 
 def test_a_machine_without_the_files_gets_a_sentence() -> None:

@@ -182,9 +182,17 @@ class _Attempt:
         except KeyboardInterrupt:  # so Ray cancels a task
             assert self._process.stdin is not None
             self._process.stdin.close()
-            self._process.wait()
+            self._outlast()
             return None
         return self._process.returncode
+
+    def _outlast(self) -> None:
+        """Waits until the process has ended, though Ray repeats its interrupt: a run that it calls stopped writes no
+        more."""
+        while True:
+            with suppress(KeyboardInterrupt):
+                self._process.wait()
+                return
 
     def what_went_wrong(self) -> str:
         """One line."""
