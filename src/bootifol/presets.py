@@ -241,10 +241,13 @@ FRAMES = replace(
     interactive=InteractiveConfig(
         agent_steps=100_000, reward_update_every=8, reward_updates_until=48_000, agent_videos=1000
     ),
-    demonstrations=DemonstrationConfig(),
+    demonstrations=DemonstrationConfig(
+        fraction=0.25, inverse_dynamics_updates=1000, cloning_updates=0, phases=20, repeat_every=2000
+    ),
     evaluation=replace(CPU.evaluation, every=10_000),
 )
-"""`cpu` with a reward from single frames, an agent that reads what its eyes make of them, and nothing cloned."""
+"""`cpu` with a reward from single frames, and an agent that reads what its eyes make of them. Nothing is cloned; a
+quarter of every batch comes from the expert videos, with inferred actions."""
 
 DEMO = replace(
     FRAMES,

@@ -14,7 +14,7 @@ from bootifol.evaluation.sight import SEES, against_kinds, in_words
 from bootifol.evaluation.summary import Summary, summarize
 from bootifol.evaluation.tables import EvaluationRow, RankingRow
 from bootifol.reports.final_return import FinalReturn, final_return
-from bootifol.reports.names import hears_reward
+from bootifol.reports.names import clones, hears_reward
 from bootifol.reports.run_files import ALIGNMENT, CLONING, INTERACTIVE, RunFiles
 from bootifol.reports.style import short_number
 
@@ -195,7 +195,7 @@ def _reward_without_half_good(run: RunFiles) -> Finding | None:
 
 def _cloning(run: RunFiles) -> Finding | None:
     """From where to where the first Cloning Phase took the true return, and where it was after the last."""
-    if CLONING not in run.phase_seconds or not run.episode_lengths():
+    if CLONING not in run.phase_seconds or not clones(run) or not run.episode_lengths():
         return None
     began, ended = run.phase_seconds[CLONING]
     length = run.episode_lengths()[0]
@@ -225,7 +225,7 @@ def _following(run: RunFiles) -> Finding | None:
     after it, for the return jumps there without the reward's doing. The method that learns from the true return and
     a policy that hears no reward have nothing to tell.
     """
-    cloned = CLONING in run.phase_seconds
+    cloned = clones(run) and CLONING in run.phase_seconds
     reward = run.curve(INTERACTIVE, "episode/learned_reward")
     if reward is None or run.method == "environment" or not hears_reward(run):
         return None

@@ -30,10 +30,10 @@ from bootifol.reports.film_strip import reward_above_film_strip, videos_of_start
 from bootifol.reports.final_return import FinalReturn, final_return
 from bootifol.reports.findings import findings
 from bootifol.reports.markdown import markdown_table
-from bootifol.reports.names import agent_name, hears_reward, task_title
+from bootifol.reports.names import agent_name, clones, hears_reward, infers_actions, task_title
 from bootifol.reports.plots import looks_of, return_curves
 from bootifol.reports.result_tables import fixed_number
-from bootifol.reports.run_files import CLONING, RunFiles, flattened, read_run
+from bootifol.reports.run_files import RunFiles, read_run
 from bootifol.reports.style import KIND_NAMES, save_png, short_number
 
 POLICY = "policy.safetensors"
@@ -120,10 +120,15 @@ def what_taught(run: RunFiles) -> str:
             "infer the actions (behavioral cloning from observation). No reward was heard."
         )
     reward = f"a reward that was learned from {videos} ({_plain(agent_name(run))})"
-    if not _clones(run):
+    if not infers_actions(run):
         return (
             f"The **learned reward alone** taught this policy: {reward}, without actions, states or rewards in them. "
             "Nothing was cloned."
+        )
+    if not clones(run):
+        return (
+            f"This policy **learned by reward**: {reward}, without actions, states or rewards in them. The videos were "
+            "among its experience, with actions that inverse dynamics inferred; nothing was cloned."
         )
     return (
         f"This policy began as a **clone** of the videos, and then **learned by reward**: {reward}, without actions, "
@@ -139,16 +144,6 @@ def public_command(command: str) -> str:
         words = command.split()
     shown = [re.sub(r"(^|=)(~|/|[A-Za-z]:\\)\S*[/\\]", r"\1", word.rstrip("/")) for word in words]
     return " ".join(shlex.join(shown).replace("`", "'").split()) or "(not recorded)"
-
-
-def _clones(run: RunFiles) -> bool:
-    """Whether the policy was ever taught by videos' inferred actions."""
-    config = dict(flattened(run.config))
-    try:
-        shared = float(config.get("demonstrations.fraction", 0.0)) > 0
-    except ValueError:  # somebody wrote no number
-        shared = False
-    return shared or CLONING in run.phase_seconds
 
 
 def _tags(run: RunFiles) -> list[str]:

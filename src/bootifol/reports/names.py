@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bootifol.reports.run_files import RunFiles, flattened
+from bootifol.reports.run_files import CLONING, RunFiles, flattened
 from bootifol.rewards.config import NAMES
 from bootifol.tasks import short_name
 
@@ -33,6 +33,29 @@ def hears_reward(run: RunFiles) -> bool:
     except ValueError:  # somebody wrote no number
         return True
     return weight < CLONING_ALONE
+
+
+def clones(run: RunFiles) -> bool:
+    """Whether the policy was pulled to inferred actions, or began with them; where they are experience alone it was
+    not."""
+    config = dict(flattened(run.config))
+    try:
+        updates, weight = (
+            float(config.get(name, default))
+            for name, default in (("demonstrations.cloning_updates", 1.0), ("agent.cloning_weight", 0.0))
+        )
+    except ValueError:  # somebody wrote no number
+        return True
+    return infers_actions(run) and (updates > 0 or weight > 0)
+
+
+def infers_actions(run: RunFiles) -> bool:
+    """Whether expert videos with inferred actions were among what the policy learned from."""
+    try:
+        fraction = float(dict(flattened(run.config)).get("demonstrations.fraction", 0.0))
+    except ValueError:  # somebody wrote no number
+        fraction = 0.0
+    return fraction > 0 or CLONING in run.phase_seconds
 
 
 def agent_name(run: RunFiles) -> str:

@@ -96,6 +96,10 @@ class SeesFrames(Protocol):
         """The video with the states of its frames."""
         ...
 
+    def states_for_the_agent(self, expert_video: Video) -> FrameStates:
+        """States int8 `[T + 1, Z]` of an expert video as the agent's own camera would give them."""
+        ...
+
     def score(self, states: FrameStates) -> Rewards:
         """Rewards float32 `[N]` of frames by their states int8 `[N, Z]`."""
         ...

@@ -1,7 +1,8 @@
-"""Cloning Phase: the policy becomes a clone of the expert videos, with inferred actions.
+"""Cloning Phase: the actions of the expert videos are inferred, and the policy becomes their clone, or does not.
 
 It goes beyond the paper, and only runs with `demonstrations` have it: once when the agent's warm-up ends, whose steps
-are what the inverse dynamics learns from, and again whenever there are enough newer ones.
+are what the inverse dynamics learns from, and again whenever there are enough newer ones. Where `cloning_updates` is 0
+nothing is cloned: the videos are experience with inferred actions and learned rewards, no more.
 """
 
 from __future__ import annotations
@@ -89,7 +90,8 @@ def cloning_phase(
         counters.cloning_gradient_steps += bool(metrics)
         counters.cloning_seconds += watch.lap()
         done = counters.cloning_steps - earlier
-        counters.to_evaluate = int(done == total)  # also where the run is stopped just now
+        clones = config.cloning_updates > 0
+        counters.to_evaluate = int(clones and done == total)  # also where the run is stopped just now
         unlogged += bool(metrics)
         log_is_due = unlogged > 0 and (done % log_every == 0 or done == total)
         if log_is_due:

@@ -75,7 +75,8 @@ class DemonstrationConfig:
     """Gradient steps of the inverse dynamics in each Cloning Phase; the first comes when the agent's warm-up ends."""
 
     cloning_updates: CountOrZero = 4000
-    """Gradient steps of encoder and actor towards the inferred actions in each Cloning Phase."""
+    """Gradient steps of encoder and actor towards the inferred actions in each Cloning Phase; with 0 nothing is cloned,
+    and the videos are experience alone."""
 
     phases: Count = 3
     """Cloning Phases of a run."""

@@ -1,9 +1,10 @@
 """Expert videos as experience: with inferred actions and learned rewards they enter the agent's batches.
 
 This goes beyond the paper, and is off by default. The agent's own steps teach an inverse-dynamics model which action
-leads from one picture to the next; it names the actions of the expert videos, the learned reward rewards them, the
-policy starts as their clone (`cloning.py`), and a fraction of every batch is drawn from them. Nobody gave an action
-or a reward: both are inferred from pictures.
+leads from one picture to the next; it names the actions of the expert videos, the learned reward rewards them, and a
+fraction of every batch is drawn from them: the critic learns what the expert's way is worth before the agent has found
+it. Where `cloning_updates` is above 0, the policy starts as their clone, too (`cloning.py`). Nobody gave an action or a
+reward: both are inferred from pictures.
 
 A clone of stacked pictures learns to go on as it went: what it did last is visible in the stack, and most often what
 the expert did next. At rest it then stays at rest. So of most demonstrated stacks only the newest picture is kept, and
@@ -23,7 +24,7 @@ from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.envs.pictures import resize
 from bootifol.progress import progress
 from bootifol.replay.buffer import ReplayBuffer
-from bootifol.rewards.base import Featurizer, RewardModel
+from bootifol.rewards.base import RewardModel, SeesFrames
 from bootifol.rewards.references import draw_references
 from bootifol.training.config import DemonstrationConfig
 from bootifol.types import Arrays, Batch, Episode, Frames, FrameStates, StepMetrics, Video, VideoSource
@@ -35,7 +36,7 @@ MOVING_FRACTION = 0.8
 """Fraction of the transitions drawn from expert videos in which the picture moves."""
 
 HISTORY_DROPOUT = 0.8
-"""Fraction of the observations drawn from expert videos whose stack repeats its newest frame."""
+"""Fraction of the observations drawn from expert videos whose stack repeats its newest frame, where they are cloned."""
 
 BATCH_SIZE = 128
 """Transitions of a gradient step of the inverse dynamics."""
@@ -65,7 +66,7 @@ class Demonstrations:
         inverse_dynamics: InverseDynamics,
         frame_size: int,
         action_dim: int,
-        featurizer: Featurizer | None = None,
+        featurizer: SeesFrames | None = None,
     ) -> None:
         self.config = config
         self.expert = expert
@@ -74,6 +75,7 @@ class Demonstrations:
         self.frame_size = frame_size
         self.featurizer = featurizer
         self._action_dim = action_dim
+        self._states: list[FrameStates] = []
         if featurizer is None:
             self.fill()
 
@@ -88,6 +90,8 @@ class Demonstrations:
         moving = []
         with progress("expert videos as experience", len(self)) as advance:
             for index in range(len(self)):
+                if self.featurizer is not None:
+                    self._states.append(self.featurizer.states_for_the_agent(self.expert[index]))
                 video = self._video(index)
                 frames = self._at_agent_size(video)
                 steps = len(frames) - 1
@@ -129,6 +133,10 @@ class Demonstrations:
         actions = self.inverse_dynamics.actions(frames)
         self.replay.relabel(self.replay.episode_ids[index], rewards, actions)
 
+    def relabel_all(self, reward_model: SeesFrames) -> None:
+        """Gives all videos the rewards that the reward model now sees in them, where replay keeps states."""
+        self.replay.relabel_all(reward_model.score)
+
     def sample(self, batch_size: int, rng: np.random.Generator) -> Batch:
         """Transitions of the expert videos, most of them where the picture moves."""
         moving = round(batch_size * MOVING_FRACTION)
@@ -136,7 +144,8 @@ class Demonstrations:
         drawn = np.concatenate(
             [rng.choice(self._moving, moving), rng.choice(self._still, batch_size - moving)]
         )
-        return self.replay.sample(batch_size, rng, transitions=drawn, history_dropout=HISTORY_DROPOUT)
+        dropout = HISTORY_DROPOUT if self.config.cloning_updates > 0 else 0.0
+        return self.replay.sample(batch_size, rng, transitions=drawn, history_dropout=dropout)
 
     def mixed(self, agent_replay: ReplayBuffer, batch_size: int, rng: np.random.Generator) -> Batch:
         """A batch of which `fraction` comes from the expert videos."""
@@ -178,7 +187,7 @@ class Demonstrations:
     def _video(self, index: int) -> Video:
         """With its states, where replay keeps them."""
         video = self.expert[index]
-        return video if self.featurizer is None else self.featurizer.with_features(video)
+        return video if self.featurizer is None else replace(video, features=self._states[index])
 
     def _at_agent_size(self, video: Video) -> Frames:
         if video.frames.shape[1] == self.frame_size:

@@ -232,6 +232,8 @@ class InteractivePhase:
         if isinstance(model, SeesFrames) and self.replay.keeps_states:
             if counters.reward_updates % RELABEL_EVERY == 0:
                 self.replay.relabel_all(model.score)
+                if self.demonstrations is not None:
+                    self.demonstrations.relabel_all(model)
         else:
             for _ in range(self.config.relabel_episodes):
                 self._relabel_one()

@@ -236,7 +236,7 @@ class Trainer:
             self._checkpoint()
 
     def _clone(self) -> None:
-        """Takes the steps of a Cloning Phase that are left, and evaluates the clone."""
+        """Takes the steps of a Cloning Phase that are left, and evaluates the clone where there is one."""
         counters, parts = self.counters, self.parts
         assert parts.demonstrations is not None
         total = steps_of_a_phase(parts.demonstrations)
@@ -251,11 +251,14 @@ class Trainer:
             counters,
             self.config.training.interactive.log_every,
         )
-        self._drive("cloning", "cloning the videos", "steps", done, total, steps)
+        clones = self.config.training.demonstrations.cloning_updates > 0
+        what = "cloning the videos" if clones else "inferring the videos' actions"
+        self._drive("cloning", what, "steps", done, total, steps)
         watch = Stopwatch()
-        counters.to_evaluate = 1
-        self._evaluate_if_due()
-        self._checkpoint()
+        if clones:
+            counters.to_evaluate = 1
+            self._evaluate_if_due()
+            self._checkpoint()
         counters.cloning_seconds += watch.lap()
 
     def _act_and_learn(self) -> None:

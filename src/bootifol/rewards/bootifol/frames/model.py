@@ -163,6 +163,10 @@ class FrameRewardModel(LearnedRewardModel[FrameConfig, FrameNetworks]):
         """The video with the states of its frames."""
         return replace(video, features=self.states_of(video))
 
+    def states_for_the_agent(self, expert_video: Video) -> FrameStates:
+        """States int8 `[T + 1, Z]` of an expert video, without what another camera adds to them."""
+        return self._as_the_agent_sees(self.states_of(expert_video))
+
     def states_of(self, video: Video) -> FrameStates:
         """Those that the video has, or computed now; int8 `[T + 1, Z]`."""
         if video.features is not None and video.features.dtype == np.int8:
