@@ -5,10 +5,11 @@
 
 from runs, or from a collection of them (`benchmarks.collect`), which also says how each was made.
 
-A row an evaluation: task, system, cloned, seed, minutes, agent_steps, scaled_return (the mean over its episodes), and
-how many episodes there were, of how many steps, of which how many were solved. A system is a method, with `-sequences`
-where BootIfOL learns the paper's objective alone; `cloned` is 1 where the policy learned from inferred actions. What
-each run ended with is printed.
+A row an evaluation: task, system, inferred_actions, cloned, seed, minutes, agent_steps, scaled_return (the mean over
+its episodes), and how many episodes there were, of how many steps, of which how many were solved. A system is a method,
+with `-sequences` where BootIfOL learns the paper's objective alone, or `cloning`, which hears no reward.
+`inferred_actions` is 1 where expert videos with inferred actions were in the agent's batches, and `cloned` where the
+policy was pulled to those actions. What each run ended with is printed.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ from bootifol.errors import BootifolError
 from bootifol.evaluation.summary import summarize
 from bootifol.reports.collection import read_runs
 from bootifol.reports.markdown import markdown_table
-from bootifol.reports.names import task_title
+from bootifol.reports.names import clones, hears_reward, infers_actions, task_title
 from bootifol.reports.run_files import RunFiles
 from bootifol.reports.style import RUN_COLORS, RUN_DASHES, house_style, require_png, save_png
 
-KEY = ("task", "system", "cloned", "seed")
+KEY = ("task", "system", "inferred_actions", "cloned", "seed")
 COLUMNS = (*KEY, "minutes", "agent_steps", "scaled_return", "episodes", "episode_steps", "solved")
 FINAL_EPISODES = 50
 """An evaluation of fewer episodes is one on the way: a run that has no other is unfinished."""
@@ -39,10 +40,19 @@ FINAL_EPISODES = 50
 
 def system_of(run: RunFiles) -> str:
     """The method, and whether BootIfOL learns from sequences, as in the paper, instead of single frames."""
+    if not hears_reward(run):
+        return "cloning"
     if run.method != "bootifol":
         return run.method
     reads = run.config.get("reward", {}).get("bootifol", {}).get("reward")
     return "bootifol" if reads == "frames" else "bootifol-sequences"
+
+
+def in_words(system: str, inferred_actions: str, cloned: str) -> str:
+    """A system, and what the videos taught its policy beside the reward."""
+    if system == "cloning":
+        return system
+    return system + (", cloned" if cloned == "1" else ", inferred actions" if inferred_actions == "1" else "")
 
 
 def rows_of(run: RunFiles) -> list[Row]:
@@ -56,8 +66,13 @@ def rows_of(run: RunFiles) -> list[Row]:
         raise BootifolError(
             f"{run.path} has no evaluation with a scaled return: let it learn until its first one"
         )
-    cloned = float(run.config.get("demonstrations", {}).get("fraction", 0)) > 0
-    key = (run.task, system_of(run), str(int(cloned)), str(run.seed))
+    key = (
+        run.task,
+        system_of(run),
+        str(int(infers_actions(run))),
+        str(int(clones(run))),
+        str(run.seed),
+    )
     rows = []
     for agent_steps, episodes in run.evaluations_of(lengths[-1]).items():
         scaled = [row.scaled_return for row in episodes if row.scaled_return is not None]
@@ -92,7 +107,7 @@ def all_rows(paths: Sequence[Path]) -> list[Row]:
         rows += new
     return sorted(
         rows,
-        key=lambda row: (*(row[column] for column in KEY[:3]), int(row["seed"]), int(row["agent_steps"])),
+        key=lambda row: (*(row[column] for column in KEY[:-1]), int(row["seed"]), int(row["agent_steps"])),
     )
 
 
@@ -107,7 +122,7 @@ def grouped(rows: Sequence[Row], columns: Sequence[str]) -> dict[tuple[str, ...]
 def table(rows: Sequence[Row]) -> str:
     """A row a task and system, in Markdown: where each seed ended, and their mean. What is unfinished is called so."""
     cells = []
-    for (task, system, cloned), of_system in grouped(rows, KEY[:3]).items():
+    for (task, *system), of_system in grouped(rows, KEY[:-1]).items():
         ends = [of_seed[-1] for of_seed in grouped(of_system, ("seed",)).values()]
         finished = [row for row in ends if int(row["episodes"]) >= FINAL_EPISODES]
         scores = [float(row["scaled_return"]) for row in finished]
@@ -125,8 +140,7 @@ def table(rows: Sequence[Row]) -> str:
         cells.append(
             (
                 task_title(task),
-                system,
-                "yes" if cloned == "1" else "nothing",
+                in_words(*system),
                 f"{summary.mean:.2f}{interval}" if summary else "–",
                 ", ".join(f"{score:.2f}" for score in scores) or "–",
                 ", ".join(unfinished) or "–",
@@ -137,7 +151,6 @@ def table(rows: Sequence[Row]) -> str:
     header = (
         "task",
         "system",
-        "cloned",
         "mean (95 % over seeds)",
         "seeds",
         "unfinished",
@@ -150,12 +163,12 @@ def table(rows: Sequence[Row]) -> str:
 def drawn(rows: Sequence[Row]) -> Figure:
     """Scaled returns over agent steps above, over minutes below; a column a task, a line a seed, a color a system."""
     tasks = list(grouped(rows, ("task",)))
-    systems = list(grouped(rows, ("system", "cloned")))
+    systems = list(grouped(rows, KEY[1:-1]))
     with house_style():
         figure = Figure(figsize=(2.4 * len(tasks), 4.4), dpi=150, layout="constrained")
         axes = figure.subplots(2, len(tasks), sharey=True, squeeze=False)
-        for (task, system, cloned, _), of_seed in grouped(rows, KEY).items():
-            column, place = tasks.index((task,)), systems.index((system, cloned))
+        for (task, *system, _), of_seed in grouped(rows, KEY).items():
+            column, place = tasks.index((task,)), systems.index(tuple(system))
             for line, unit in enumerate(("agent_steps", "minutes")):
                 axes[line, column].plot(
                     [float(row[unit]) / (1000 if line == 0 else 1) for row in of_seed],
@@ -172,7 +185,7 @@ def drawn(rows: Sequence[Row]) -> Figure:
                 panel.axhline(1.0, color="#7A7F87", linewidth=0.8)
         for line in range(2):
             axes[line, 0].set_ylabel("scaled return")
-        names = [f"{system}, cloned" if cloned == "1" else system for system, cloned in systems]
+        names = [in_words(*system) for system in systems]
         handles = [
             axes[0, 0].plot(
                 [], [], color=RUN_COLORS[i % len(RUN_COLORS)], linestyle=RUN_DASHES[i % len(RUN_DASHES)]

@@ -22,17 +22,24 @@ def table_of(directory: Path, runs: Iterable[Path]) -> list[tuple[str, ...]]:
 
 
 def kept(out: Path) -> list[tuple[str, ...]]:
-    return [tuple(row[name] for name in COLUMNS[:7]) for row in read_rows(out, COLUMNS)]
+    return [tuple(row[name] for name in COLUMNS[:8]) for row in read_rows(out, COLUMNS)]
 
 
 def test_a_run_is_kept_under_its_task_system_and_seed(tmp_path: Path) -> None:
     runs, out = tmp_path / "runs", tmp_path / "paper.csv"
     write_run(runs / "frames", [40.0, 60.0], seed=2, seconds=120.0, **FRAMES)
     write_run(runs / "cloned", [80.0], demonstrations__fraction=0.25)
+    experience = {**FRAMES, "demonstrations__fraction": 0.25, "demonstrations__cloning_updates": 0}
+    write_run(runs / "experience", [90.0], **experience, agent__cloning_weight=0.0)
+    write_run(
+        runs / "clone", [70.0], **{**FRAMES, "demonstrations__fraction": 0.25}, agent__cloning_weight=1e6
+    )
     assert main([str(runs), "--out", str(out)]) == 0
     assert kept(out) == [
-        ("reacher_hard", "bootifol", "0", "2", "2.0", "1000", "0.5000"),
-        ("reacher_hard", "bootifol-sequences", "1", "1", "1.0", "1000", "0.8000"),
+        ("reacher_hard", "bootifol", "0", "0", "2", "2.0", "1000", "0.5000"),
+        ("reacher_hard", "bootifol", "1", "0", "1", "1.0", "1000", "0.9000"),
+        ("reacher_hard", "bootifol-sequences", "1", "1", "1", "1.0", "1000", "0.8000"),
+        ("reacher_hard", "cloning", "1", "1", "1", "1.0", "1000", "0.7000"),
     ]
 
 
@@ -51,7 +58,7 @@ def test_two_runs_of_one_name_are_refused_and_nothing_is_written(
     for name in ("a", "b"):
         write_run(tmp_path / "runs" / name, **FRAMES)
     assert main([str(tmp_path / "runs"), "--out", str(tmp_path / "paper.csv")]) == 2
-    assert "reacher_hard bootifol 0 1" in capsys.readouterr().err
+    assert "reacher_hard bootifol 0 0 1" in capsys.readouterr().err
     assert not (tmp_path / "paper.csv").exists()
 
 
@@ -61,7 +68,7 @@ def test_a_run_without_its_last_evaluation_is_called_unfinished(tmp_path: Path) 
     write_run(tmp_path / "runs" / "two", [90.0] * 5, seed=2, **FRAMES)
     assert main([str(tmp_path / "runs"), "--out", str(out)]) == 0
     cells = table(read_rows(out, COLUMNS)).splitlines()[-1].split(" | ")
-    assert cells[3:6] == ["0.40", "0.40", "0.90 at 1,000"], "no mean over what is not finished"
+    assert cells[2:5] == ["0.40", "0.40", "0.90 at 1,000"], "no mean over what is not finished"
 
 
 def test_the_figure_is_a_png(tmp_path: Path) -> None:
