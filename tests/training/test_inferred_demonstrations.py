@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,13 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tiny_runs import WITH_DEMONSTRATIONS, new_run
+from tiny_runs import INFERRING, WITH_DEMONSTRATIONS, new_run
 
 from bootifol.agents.config import DrQv2Config
 from bootifol.agents.drqv2 import DrQv2
 from bootifol.agents.inverse_dynamics import InverseDynamics
 from bootifol.errors import BootifolError
 from bootifol.replay.buffer import ReplayBuffer
+from bootifol.rewards.bootifol.frames.model import FrameRewardModel
 from bootifol.training import inferred_demonstrations
 from bootifol.training.budget import Budget, Counters
 from bootifol.training.cloning import (
@@ -177,6 +179,24 @@ def test_cloning_phases_come_when_they_are_due(tmp_path: Path, demos: Path) -> N
     assert counters.cloning_gradient_steps == 3 * (3 + 4)
     assert counters.cloning_steps == 3 * (3 + 4 + 4), "4 videos are named the actions of"
     assert counters.cloning_began_at == 180
+
+
+def test_videos_can_be_experience_alone(tmp_path: Path, demos: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(DrQv2, "clone", lambda *_: pytest.fail("something was cloned"))
+    run = new_run(tmp_path / "run", demos, config=INFERRING)
+    assert run.learn()
+    shown, model = run.parts.demonstrations, run.parts.reward_model
+    assert shown is not None and isinstance(model, FrameRewardModel)
+    assert run.counters.cloning_phases == INFERRING.demonstrations.phases
+    rows = [json.loads(line) for line in (tmp_path / "run" / "metrics.jsonl").read_text().splitlines()]
+    evaluated = [row["agent_steps"] for row in rows if "evaluation/return_60" in row]
+    assert evaluated == [120, 240], "no evaluation of a clone that there is not"
+    batch = shown.replay.sample(60, np.random.default_rng(0), transitions=np.arange(60))
+    assert (batch.action != 0).any(), "actions were inferred"
+    # The videos' rewards follow the head as it learns.
+    model.update(run.parts.demos.expert, run.parts.agent_videos)
+    shown.relabel_all(model)
+    np.testing.assert_array_equal(shown.replay.state()["rewards"][:30], model.label(shown.expert[0]))
 
 
 @pytest.mark.parametrize(("policy_steps", "newest"), [(0, None), (30, 30), (10**9, 720)])

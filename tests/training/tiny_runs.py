@@ -90,6 +90,13 @@ SEEING = replace(
 )
 """The same with a reward from single frames and an agent that reads states."""
 
+INFERRING = replace(
+    SEEING,
+    agent=replace(SEEING.agent, cloning_weight=0.0),
+    demonstrations=replace(SEEING.demonstrations, cloning_updates=0),
+)
+"""The same with the videos as experience alone: nothing is cloned."""
+
 ENDS_SOON = replace(
     TINY,
     agent=replace(TINY.agent, ema_decay=0.9, warm_up_steps=30),
@@ -101,6 +108,7 @@ RUNS = [
     pytest.param("bootifol", TINY, id="paper"),
     pytest.param("bootifol", ENCODING_BASED, id="encoding_based"),
     pytest.param("bootifol", SEEING, id="frames"),
+    pytest.param("bootifol", INFERRING, id="inferred_actions"),
     *(pytest.param(method, WITH_DEMONSTRATIONS, id=method) for method in METHODS),
 ]
 """Method and configuration of what must hold for every method: cloning asks the reward for more than acting does."""
