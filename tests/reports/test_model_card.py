@@ -92,6 +92,10 @@ def test_the_card_says_what_the_run_was(exported: tuple[Path, Path]) -> None:
             "began as a **clone** of the videos, and then **learned by reward**",
         ),
         (
+            {"demonstrations__fraction": 0.5, "demonstrations__cloning_updates": 0},
+            "with actions that inverse dynamics inferred; nothing was cloned",
+        ),
+        (
             {"demonstrations__fraction": 0.5, "agent__cloning_weight": 1e6},
             "This policy is a **clone** of 30 videos, without actions",
         ),
