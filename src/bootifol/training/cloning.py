@@ -20,7 +20,8 @@ from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.types import StepMetrics
 
 INVERSE_DYNAMICS_TIME = 1 / 3
-"""Fraction of a Cloning Phase's time, where it is limited, by which the inverse dynamics has learned."""
+"""Fraction of a Cloning Phase's time, where it is limited, by which the inverse dynamics has learned; all of it where
+nothing is cloned."""
 
 INVERSE_DYNAMICS_LEARNING_RATE = 5e-4
 """Of Adam at its highest: in each phase it rises for a twentieth of the gradient steps and falls to 0."""
@@ -58,6 +59,7 @@ def cloning_phase(
     demonstrations.fill()
     config = demonstrations.config
     inferring = config.inverse_dynamics_updates
+    inferring_time = INVERSE_DYNAMICS_TIME if config.cloning_updates > 0 else 1.0
     cloning, total = inferring + len(demonstrations), steps_of_a_phase(demonstrations)
     if not cloning_in_progress(demonstrations, counters):
         counters.cloning_phases += 1
@@ -70,7 +72,7 @@ def cloning_phase(
         step, time_passed = counters.cloning_steps - earlier, budget.cloning_passed(counters)
         if step < inferring:
             # The inverse dynamics learns from the agent's own steps.
-            part_passed = min(time_passed / INVERSE_DYNAMICS_TIME, 1.0)
+            part_passed = min(time_passed / inferring_time, 1.0)
             rate = one_cycle(step, inferring, part_passed) * INVERSE_DYNAMICS_LEARNING_RATE
             policy_steps = counters.agent_steps - agent.config.warm_up_steps
             metrics = demonstrations.learn_inverse_dynamics(agent_replay, policy_steps, rng, rate)
