@@ -53,7 +53,7 @@ OPTIONS = {
     "drawn_home": ("--preset", "drawn_pixels", "--interactive.reward-updates-until", "0"),
     "reacher_hard": (
         *("--preset", "frames", "--reward.bootifol.frames.noise", "0.3"),
-        *("--interactive.agent-steps", "60000"),
+        *("--interactive.agent-steps", "60000", "--demonstrations.fraction", "0"),
     ),
 }
 """Of `bootifol train`, by task."""

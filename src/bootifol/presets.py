@@ -253,6 +253,7 @@ DEMO = replace(
     FRAMES,
     alignment=AlignmentConfig(gradient_steps=1500, time_fraction=0.3),
     interactive=replace(FRAMES.interactive, agent_steps=60_000, agent_videos=500),
+    demonstrations=replace(FRAMES.demonstrations, time_fraction=0.15),
     evaluation=EvaluationConfig(every=10_000, long_episodes=1, final_episodes=10),
     checkpoint_minutes=5.0,
 )

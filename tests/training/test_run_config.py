@@ -19,6 +19,7 @@ def test_a_written_configuration_rebuilds_the_run(tmp_path: Path, preset: str) -
     run = RunConfig("drawn_reach", "bootifol", preset, 3, "demos", 90.0, PRESETS[preset])  # type: ignore[index]
     run.write(tmp_path, ["bootifol", "train"])
     assert RunConfig.read(tmp_path) == run
+    require_time_to_act(run.training)
 
 
 def test_an_unknown_field_is_named(tmp_path: Path) -> None:

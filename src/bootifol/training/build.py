@@ -23,6 +23,7 @@ from bootifol.training.checkpoint import Stateful
 from bootifol.training.inferred_demonstrations import Demonstrations
 from bootifol.training.open_demos import Demos, open_demos
 from bootifol.training.run_config import RunConfig
+from bootifol.types import OtherCamera
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,11 @@ def build_parts(run: RunConfig, task: Task, console: Console, demos: Demos | Non
     )
     if reward_model.reads_environment_reward:
         demonstrated = 0
+    if demonstrated and config.demonstrations.cloning_updates == 0 and isinstance(demos.random, OtherCamera):
+        console.print(
+            "the expert's videos are of another camera, and as the agent's experience they may mislead it: "
+            "--demonstrations.fraction 0 leaves that out"
+        )
     demonstrated_frames = demonstrated * len(demos.expert[0].frames) if demonstrated else 0
 
     # The stores D and D_a, empty, and expert videos as experience.
