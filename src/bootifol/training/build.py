@@ -99,7 +99,7 @@ def build_parts(run: RunConfig, task: Task, console: Console, demos: Demos | Non
     )
     if reward_model.reads_environment_reward:
         demonstrated = 0
-    if demonstrated and config.demonstrations.cloning_updates == 0 and isinstance(demos.random, OtherCamera):
+    if demonstrated and not config.demonstrations.clones and isinstance(demos.random, OtherCamera):
         console.print(
             "the expert's videos are of another camera, and as the agent's experience they may mislead it: "
             "--demonstrations.fraction 0 leaves that out"

@@ -59,7 +59,7 @@ def cloning_phase(
     demonstrations.fill()
     config = demonstrations.config
     inferring = config.inverse_dynamics_updates
-    inferring_time = INVERSE_DYNAMICS_TIME if config.cloning_updates > 0 else 1.0
+    inferring_time = INVERSE_DYNAMICS_TIME if config.clones else 1.0
     cloning, total = inferring + len(demonstrations), steps_of_a_phase(demonstrations)
     if not cloning_in_progress(demonstrations, counters):
         counters.cloning_phases += 1
@@ -92,8 +92,7 @@ def cloning_phase(
         counters.cloning_gradient_steps += bool(metrics)
         counters.cloning_seconds += watch.lap()
         done = counters.cloning_steps - earlier
-        clones = config.cloning_updates > 0
-        counters.to_evaluate = int(clones and done == total)  # also where the run is stopped just now
+        counters.to_evaluate = int(config.clones and done == total)  # also where the run is stopped just now
         unlogged += bool(metrics)
         log_is_due = unlogged > 0 and (done % log_every == 0 or done == total)
         if log_is_due:

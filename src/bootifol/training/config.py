@@ -89,6 +89,11 @@ class DemonstrationConfig:
     """Agent steps from one Cloning Phase to the next: steps of a policy that moves like the expert teach the inverse
     dynamics what random ones cannot, and every demonstration gets its actions and rewards anew."""
 
+    @property
+    def clones(self) -> bool:
+        """Whether Cloning Phases make a clone, or infer actions alone."""
+        return self.cloning_updates > 0
+
 
 @dataclass(frozen=True)
 @settings("evaluation")

@@ -144,7 +144,7 @@ class Demonstrations:
         drawn = np.concatenate(
             [rng.choice(self._moving, moving), rng.choice(self._still, batch_size - moving)]
         )
-        dropout = HISTORY_DROPOUT if self.config.cloning_updates > 0 else 0.0
+        dropout = HISTORY_DROPOUT if self.config.clones else 0.0
         return self.replay.sample(batch_size, rng, transitions=drawn, history_dropout=dropout)
 
     def mixed(self, agent_replay: ReplayBuffer, batch_size: int, rng: np.random.Generator) -> Batch:

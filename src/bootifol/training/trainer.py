@@ -251,7 +251,7 @@ class Trainer:
             counters,
             self.config.training.interactive.log_every,
         )
-        clones = self.config.training.demonstrations.cloning_updates > 0
+        clones = parts.demonstrations.config.clones
         what = "cloning the videos" if clones else "inferring the videos' actions"
         self._drive("cloning", what, "steps", done, total, steps)
         watch = Stopwatch()
